@@ -7,14 +7,10 @@ import pandas as pd
 
 from epsmesh.arrays import FloatArray
 
-_DATE = (
-    r"(?:(?P<year>\d{4})[-/](?P<month>\d{1,2})[-/](?P<day>\d{1,2})"
-    r"|(?P<first>\d{1,2})(?P<sign>[./])(?P<second>\d{1,2})[./](?P<last>\d{4}))"
-)
-_ONLY_DATE = re.compile(_DATE)
+_DATE = re.compile(r"\d{4}[-/]\d{1,2}[-/]\d{1,2}|\d{1,2}[./]\d{1,2}[./]\d{4}")
 _CLOCK = re.compile(
-    rf"(?:{_DATE}[T ])?(?P<hours>\d{{1,2}}):(?P<minutes>\d{{2}}):(?P<seconds>\d{{2}}(?:[.,]\d+)?)"
-    r"(?: ?(?P<half>[AaPp])[Mm])?(?: ?(?:Z|(?P<zone>[+-])(?P<ahead>\d{2}):?(?P<more>\d{2})))?"
+    rf"(?:(?P<date>{_DATE.pattern})[T ])?(?P<clock>\d{{1,2}}:\d{{2}}:\d{{2}}(?:[.,]\d+)?)"
+    r"(?: ?(?P<half>[AaPp][Mm]))?(?: ?(?P<zone>Z|[+-]\d{2}:?\d{2}))?"
 )
 _DAY = 86400.0
 
@@ -26,7 +22,7 @@ def is_clock(text: str) -> bool:
 
 def is_date(text: str) -> bool:
     """Tell a date without a clock time."""
-    return _ONLY_DATE.fullmatch(text) is not None
+    return _DATE.fullmatch(text) is not None
 
 
 def seconds(column: "pd.Series[str]") -> FloatArray:
@@ -35,37 +31,28 @@ def seconds(column: "pd.Series[str]") -> FloatArray:
     Days are those of the dates. Without dates they are counted at each midnight.
     """
     found = column.str.extract(_CLOCK)
-    parts = found[["hours", "minutes", "seconds"]].apply(lambda part: part.str.replace(",", ".", regex=False))
-    since = parts.astype(float).to_numpy() @ np.array([3600.0, 60.0, 1.0])
+    since = pd.to_timedelta(found["clock"].str.replace(",", "."), errors="coerce").dt.total_seconds().to_numpy()
     half = found["half"].str.lower().to_numpy()
-    since = since - _DAY / 2 * ((half == "a") | (half == "p")) * (since >= _DAY / 2) + _DAY / 2 * (half == "p")
-    ahead = found[["ahead", "more"]].astype(float).fillna(0.0).to_numpy() @ np.array([3600.0, 60.0])
-    since = since - np.where(found["zone"] == "-", -ahead, ahead)
-    if found[["day", "first"]].notna().any(axis=None):
-        return np.asarray(since + _DAY * _days(found))
+    since = np.where(pd.isna(half), since, since % (_DAY / 2) + _DAY / 2 * (half == "pm"))
+    zone = found["zone"].fillna("Z").replace("Z", "+0000")
+    ahead = pd.to_timedelta(zone.str[1:3] + ":" + zone.str[-2:] + ":00").dt.total_seconds()
+    since = since - np.where(zone.str.startswith("-"), -ahead, ahead)
+    if found["date"].notna().any():
+        return np.asarray(since + _DAY * _days(found["date"]))
     known = np.flatnonzero(~np.isnan(since))
     days = np.zeros(len(since))
     days[known[1:]] = np.cumsum(np.diff(since[known]) < -_DAY / 2)
     return np.asarray(since + _DAY * days)
 
 
-def _days(found: pd.DataFrame) -> FloatArray:
+def _days(dates: "pd.Series[str]") -> FloatArray:
     """Return the days (n,) of dates, from the first one on; NaN where there is none.
 
-    10/11/2025 is in October or November: that order is taken which makes sense of all dates and, if both do, by which
-    the record is the shorter.
+    10/11/2025 is in October or November: that order is taken which makes sense of all dates, in which days do not fall
+    and, if both do, by which the record is the shorter.
     """
-    if found["day"].notna().any():
-        return _counted(found, "year", "month", "day")
-    orders = [("last", "second", "first")]
-    if (found["sign"] == "/").any():
-        orders.append(("last", "first", "second"))
-    ways = [_counted(found, *order) for order in orders]
-    return min(ways, key=lambda days: (np.isnan(days).sum(), bool((np.diff(days) < 0).any()), np.ptp(days)))
-
-
-def _counted(found: pd.DataFrame, year: str, month: str, day: str) -> FloatArray:
-    """Return the days (n,) of dates from the first one on, NaN where there is none."""
-    parts = {"year": found[year], "month": found[month], "day": found[day]}
-    dates = pd.to_datetime(pd.DataFrame(parts).astype(float), errors="coerce")
-    return np.asarray((dates - dates.dropna().min()) / pd.Timedelta(days=1), dtype=float)
+    dates = dates.str.replace("/", "-")
+    forms = ("%Y-%m-%d", "%d.%m.%Y", "%d-%m-%Y", "%m-%d-%Y")
+    ways = [pd.to_datetime(dates, format=form, errors="coerce") for form in forms]
+    days = [np.asarray((way - way.min()) / pd.Timedelta(days=1), dtype=float) for way in ways]
+    return min(days, key=lambda way: (np.isnan(way).sum(), bool((np.diff(way) < 0).any()), np.nanmax(way, initial=0)))

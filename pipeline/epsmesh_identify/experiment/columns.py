@@ -1,19 +1,20 @@
 """Which columns of a table are depth, force and time: those that are named, or that are unmistakable."""
 
-from dataclasses import dataclass, replace
+import json
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh_identify.experiment.header import MASSES, factor_of, header_of, is_unit_of, without_mark
+from epsmesh_identify.experiment.header import factor_of, header_of, is_mass, is_unit_of, without_mark
 from epsmesh_identify.experiment.reading import UNITS, ExperimentError, Reading
 from epsmesh_identify.experiment.table import Table
-from epsmesh_identify.experiment.words import is_called
 
 # Two columns of one kind are the same but for a constant within this share of their range.
 _SAME = 1e-3
-_SECTION = "[[measurement]]"
 _KINDS = {"m": "a length", "N": "a force", "s": "a time"}
+# Of columns without a unit, as an example.
+_EXAMPLES = {"m": "mm", "N": "mN", "s": "s"}
 
 
 @dataclass(frozen=True)
@@ -54,219 +55,240 @@ class Recorded:
         return replace(self, notes=(*self.notes, *words))
 
 
-def recorded(table: Table, reading: Reading) -> Recorded:
-    """Return the columns of a table in SI units, without rows in which a value is missing.
+@dataclass(frozen=True)
+class Choice:
+    """The choice of the columns of a table, as a study reads it; ``notes`` say which were found, and what is odd."""
 
-    Raises:
-        ExperimentError: if a column is missing, ambiguous, of another kind, without a unit, or has text.
-    """
-    notes = [*table.notes, *_empty(table)]
-    has_spring = "deflection" in reading.columns
-    wanted = ("piezo", "deflection") if has_spring else ("depth", "force")
-    chosen: dict[str, int] = {}
-    for kind in wanted:
-        chosen[kind] = _named(table, kind, reading) if kind in reading.columns else _found(table, kind, reading, notes)
-    if "time" in reading.columns:
-        chosen["time"] = _named(table, "time", reading)
-    elif (time := _time(table, set(chosen.values()), reading, notes)) is not None:
-        chosen["time"] = time
-    _check_distinct(table, chosen)
-    values = {kind: _in_si(table, number, kind, reading, notes) for kind, number in chosen.items()}
-    names = {kind: table.headers[number].text or f"{number + 1}" for kind, number in chosen.items()}
-    way = values["piezo" if has_spring else "depth"]
-    force = values["deflection"] * (reading.spring or 1.0) if has_spring else values["force"]
-    found = Recorded(
-        table.file, way, force, values.get("time"), table.lines, names, tuple(notes), values.get("deflection")
-    )
-    return _without_missing(found)
+    table: Table
+    reading: Reading = field(default_factory=Reading)
+    notes: list[str] = field(default_factory=list)
 
+    def recorded(self) -> Recorded:
+        """Return the columns in SI units, without rows in which a value is missing.
 
-def _empty(table: Table) -> list[str]:
-    """Say which columns have no value."""
-    numbers = np.flatnonzero(np.isnan(table.values).all(axis=0))
-    empty = [table.headers[n].text for n in numbers if table.headers[n].text and n not in table.strange]
-    return [f"columns without values: {', '.join(empty)}"] if empty else []
-
-
-def _title(table: Table, number: int) -> str:
-    """Return what a message calls a column: its header, else its number."""
-    return table.headers[number].text or f"number {number + 1}"
-
-
-def _listed(table: Table) -> str:
-    return ", ".join(f"`{_title(table, number)}`" for number in range(len(table.headers)))
-
-
-def _unused(table: Table) -> str:
-    """Return why the headers of a file are not used; "" if they are."""
-    return f"; {table.unused}" if table.unused else ""
-
-
-def _named(table: Table, kind: str, reading: Reading) -> int:
-    """Return the number of the column that the study names, by header or number."""
-    wanted = reading.columns[kind]
-    if isinstance(wanted, int):
-        if wanted > len(table.headers):
-            raise ExperimentError(table.file, f"columns.{kind} = {wanted}: there are {len(table.headers)} columns")
-        return wanted - 1
-    wanted = without_mark(wanted)
-    plain = [_plain(header.text) for header in table.headers]
-    found = [number for number, text in enumerate(plain) if text == _plain(wanted)]
-    if not found:  # without the unit, which may be in one of both only
-        own = _plain(header_of(wanted).name)
-        found = [number for number, header in enumerate(table.headers) if header.name and _plain(header.name) == own]
-    if not found:
-        raise ExperimentError(
-            table.file, f'has no column "{wanted}" for {kind}: it has {_listed(table)}{_unused(table)}'
+        Raises:
+            ExperimentError: if a column is missing, ambiguous, of another kind, without a unit, or has text.
+        """
+        table, headers = self.table, self.table.headers
+        empty = [header.text for n, header in enumerate(headers) if not (self._is_full(n) or n in table.strange)]
+        if empty := list(filter(None, empty)):
+            self.notes.append(f"columns without values: {', '.join(empty)}")
+        has_spring = "deflection" in self.reading.columns
+        wanted = ("piezo", "deflection") if has_spring else ("depth", "force")
+        chosen = {kind: self._named(kind) if kind in self.reading.columns else self._found(kind) for kind in wanted}
+        time = self._named("time") if "time" in self.reading.columns else self._time(set(chosen.values()))
+        chosen |= {} if time is None else {"time": time}
+        kinds: dict[int, str] = {}
+        for kind, number in chosen.items():
+            if other := kinds.get(number):
+                raise self._refusal(f"is named for {other} and {kind}", number)
+            kinds[number] = kind
+        values = {kind: self._in_si(number, kind) for kind, number in chosen.items()}
+        names = {kind: headers[number].text or f"{number + 1}" for kind, number in chosen.items()}
+        way, force = (values[kind] for kind in wanted)
+        found = Recorded(
+            table.file,
+            way,
+            force * (self.reading.spring or 1.0) if has_spring else force,
+            values.get("time"),
+            table.lines,
+            names,
+            (*table.notes, *self.notes),
+            values.get("deflection"),
         )
-    if len(found) > 1 and not _are_equal(table, found):
-        numbers = ", ".join(str(number + 1) for number in found)
-        raise ExperimentError(table.file, f'has several columns "{wanted}": give {kind} by number, one of {numbers}')
-    return found[0]
+        return _without_missing(found)
+
+    def to_paste(self) -> list[str]:
+        """Return the lines of a study that choose the columns: the likely ones, for the user to check."""
+        columns, units = self._likely()
+        lacking = [kind for kind in ("depth", "force") if kind not in columns and "spring" not in columns]
+        hint = f"; no column has the name and unit of {' and '.join(lacking)}" if lacking else ""
+        if not columns:
+            return [f"# columns = {{depth = …, force = …}}{hint}"]
+        check = f"# check: header or number of each column{hint}"
+        return [f"columns = {_inline(columns)} {check}", *([f"units = {_inline(units)} # check"] if units else [])]
+
+    def _likely(self) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the likely columns, and units where headers have none, as a study writes both."""
+        headers = self.table.headers
+        lengths = [n for n, header in enumerate(headers) if is_unit_of(header.unit, "m")]
+        bent = [n for n in lengths if headers[n].is_called("deflection")]
+        if bent and (ways := [n for n in lengths if n not in bent]):
+            spring = _text(self.table.spring or "0.05 N/m")
+            return {"piezo": self._pasted(ways[0]), "deflection": self._pasted(bent[0]), "spring": spring}, {}
+        order = ("time", "depth", "force")
+        chosen: dict[str, int] = {}
+        if not any(header.text for header in headers):  # in this order, as most files have them
+            first = max(len(order) - len(headers), 0)
+            chosen = {kind: order.index(kind) - first for kind in order[1:]}
+        for kind in order if any(header.text for header in headers) else ():
+            free = [n for n in self._candidates(kind) if n not in {*chosen.values(), *self.table.strange}]
+            chosen |= {kind: free[0]} if free else {}
+        units = {k: _text(_EXAMPLES[UNITS[k]]) for k, number in chosen.items() if not headers[number].unit}
+        return {kind: self._pasted(number) for kind, number in chosen.items()}, units
+
+    def _pasted(self, number: int) -> str:
+        text = self.table.headers[number].text
+        return _text(text) if text else f"{number + 1}"
+
+    def _title(self, number: int) -> str:
+        """Return what a message calls a column: its header, else its number."""
+        return self.table.headers[number].text or f"number {number + 1}"
+
+    def _refusal(self, why: str, number: int | None = None, line: int | None = None) -> ExperimentError:
+        column = "" if number is None else self._title(number)
+        return ExperimentError(self.table.file, why, column=column, line=line)
+
+    def _listed(self) -> str:
+        return ", ".join(f"`{self._title(number)}`" for number in range(len(self.table.headers)))
+
+    def _named(self, kind: str) -> int:
+        """Return the number of the column that the study names, by header or number."""
+        wanted, headers = self.reading.columns[kind], self.table.headers
+        if isinstance(wanted, int):
+            if wanted > len(headers):
+                raise self._refusal(f"columns.{kind} = {wanted}: there are {len(headers)} columns")
+            return wanted - 1
+        wanted = without_mark(wanted)
+        found = [number for number, header in enumerate(headers) if _plain(header.text) == _plain(wanted)]
+        if not found:  # without the unit, which may be in one of both only
+            own = _plain(header_of(wanted).name)
+            found = [number for number, header in enumerate(headers) if own == _plain(header.name) != ""]
+        if not found:
+            unused = f"; {self.table.unused}" if self.table.unused else ""
+            raise self._refusal(f'has no column "{wanted}" for {kind}: it has {self._listed()}{unused}')
+        if len(found) > 1 and not self._are_equal(found):
+            numbers = ", ".join(str(number + 1) for number in found)
+            raise self._refusal(f'has several columns "{wanted}": give {kind} by number, one of {numbers}')
+        return found[0]
+
+    def _are_equal(self, numbers: list[int], *, but_for_a_constant: bool = False) -> bool:
+        """Tell columns with the same values; a constant between them may be left out."""
+        values = self.table.values[:, numbers]
+        values = values[~np.isnan(values).any(axis=1)]
+        if not len(values):
+            return False
+        first, off = values[:, 0], values - values[:, :1]
+        apart = np.ptp(off, axis=0) if but_for_a_constant else np.abs(off).max(axis=0)
+        return bool(apart.max() <= _SAME * np.ptp(first))
+
+    def _candidates(self, kind: str) -> list[int]:
+        """Return the columns that can be depth, force or time: those called so, else those of such a unit."""
+        called, of_kind = [], []
+        for number, header in enumerate(self.table.headers):
+            unit, is_called = self._unit(number, kind), header.is_called(kind)
+            is_of_kind = is_unit_of(unit, UNITS[kind]) and (is_called or not is_mass(unit))
+            is_of_kind &= not (kind == "depth" and header.is_called("deflection"))
+            if self._is_full(number) and (is_of_kind or (is_called and not unit)):
+                of_kind += [number] if is_of_kind else []
+                called += [number] if is_called else []
+        return sorted(called, key=lambda number: number not in of_kind) or of_kind
+
+    def _found(self, kind: str) -> int:
+        """Return the column that is unmistakably depth or force."""
+        found = self._candidates(kind)
+        titles = [f"`{self._title(number)}`" for number in found]
+        if found and self._are_equal(found, but_for_a_constant=kind == "force"):
+            same = f"; {', '.join(titles[1:])} differs by no more than a constant" if titles[1:] else ""
+            self.notes.append(f"{kind} is column {titles[0]}{same}")
+            return found[0]
+        what = f"could be {', '.join(titles)}" if found else "is not found"
+        columns, units = self._likely()
+        columns = columns if "spring" in columns else {"depth": "…", "force": "…"} | columns
+        remedy = f"columns = {_inline(columns)}" + (f" and units = {_inline(units)}" if units else "")
+        why = "; ".join([f"write in [[measurement]] {remedy}", *self._reasons(kind)])
+        raise self._refusal(f"{kind} {what} among {self._listed()}: {why}")
+
+    def _reasons(self, kind: str) -> list[str]:
+        """Return why columns that are called so are none: they have text or nothing, or a unit of another kind."""
+        reasons = [self.table.unused] if self.table.unused else []
+        for number, header in enumerate(self.table.headers):
+            title, unit, is_called = self._title(number), self._unit(number, kind), header.is_called(kind)
+            if number in self.table.strange:
+                line, text = self.table.strange[number]
+                reasons.append(f'`{title}` has text, "{text}" in line {line}')
+            elif is_called and not self._is_full(number):
+                reasons.append(f"`{title}` has no values")
+            elif is_called and unit and not is_unit_of(unit, UNITS[kind]):
+                reasons.append(f"`{title}` has the unit {unit}, no unit of {_KINDS[UNITS[kind]]}")
+        if any(header.is_called("deflection") and is_unit_of(header.unit, "m") for header in self.table.headers):
+            reasons.append("if the force is the deflection of a spring, name piezo, deflection and spring")
+        return reasons
+
+    def _time(self, taken: set[int]) -> int | None:
+        """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
+        for number, (line, text) in self.table.strange.items():
+            if self.table.headers[number].is_called("time"):
+                title = self._title(number)
+                self.notes.append(f'column `{title}` has text, "{text}" in line {line}, and is not read as time')
+        found = []
+        for number in self._candidates("time"):
+            if number not in taken and self._unit(number, "time"):
+                found.append(number)
+            elif number not in taken:
+                title = self._title(number)
+                self.notes.append(f"column `{title}` has no unit, and is not read as time: give it in units")
+        if len(found) > 1:
+            titles = ", ".join(map(self._title, found))
+            self.notes.append(f"time could be {titles}: not read; name it in columns")
+        if len(found) != 1:
+            return None
+        self.notes.append(f"time is column `{self._title(found[0])}`")
+        return found[0]
+
+    def _is_full(self, number: int) -> bool:
+        return not bool(np.isnan(self.table.values[:, number]).all())
+
+    def _units(self, number: int, kind: str) -> dict[str, str]:
+        """Return the units of a column as text, by where they are: in the header, the study's name of it, `units`."""
+        wanted = self.reading.columns.get(kind)
+        named = header_of(wanted).unit if isinstance(wanted, str) else ""
+        found = {
+            "": self.table.headers[number].unit,
+            f'columns.{kind} is "{wanted}"': named,
+            f'units.{kind} is "{self.reading.units.get(kind)}"': self.reading.units.get(kind, ""),
+        }
+        return {place: unit for place, unit in found.items() if unit}
+
+    def _unit(self, number: int, kind: str) -> str:
+        return next(iter(self._units(number, kind).values()), "")
+
+    def _in_si(self, number: int, kind: str) -> FloatArray:
+        """Return a column in SI units."""
+        si = UNITS[kind]
+        if number in self.table.strange:
+            line, text = self.table.strange[number]
+            raise self._refusal(f'"{text}" is no number (for {kind}): correct or remove it', number, line)
+        if not self._is_full(number):
+            raise self._refusal(f"has no values (for {kind})", number)
+        units = self._units(number, kind)
+        if not units:
+            remedy = f'write units = {{{kind} = "{_EXAMPLES[si]}"}} in [[measurement]]'
+            raise self._refusal(f"has no unit: {remedy}", number)
+        unit = self._unit(number, kind)
+        try:
+            factor = factor_of(unit, si)
+        except ValueError as error:
+            message = getattr(error, "message", error.__str__)()
+            raise self._refusal(f"cannot be {kind}: {message}", number) from None
+        for place, other in units.items():
+            if is_unit_of(other, si) and not np.isclose(factor_of(other, si), factor, rtol=1e-9):
+                raise self._refusal(f"has the unit {unit}, but {place}: remove the wrong one", number)
+        if is_mass(unit):
+            self.notes.append(f"{kind} is the weight of a mass: 1 {unit} is {factor:.6g} N")
+        return self.table.values[:, number] * factor
+
+
+def _inline(keys: dict[str, str]) -> str:
+    return f"{{{', '.join(f'{key} = {value}' for key, value in keys.items())}}}"
 
 
 def _plain(text: str) -> str:
     return " ".join(text.casefold().split())
 
 
-def _are_equal(table: Table, numbers: list[int], *, but_for_a_constant: bool = False) -> bool:
-    """Tell columns with the same values; a constant between them may be left out."""
-    first, *others = (table.values[:, number] for number in numbers)
-    spread = float(np.ptp(first[~np.isnan(first)])) if not np.isnan(first).all() else 0.0
-    for other in others:
-        difference = (other - first)[~np.isnan(other - first)]
-        if not difference.size:
-            return False
-        off = np.ptp(difference) if but_for_a_constant else np.abs(difference).max()
-        if off > _SAME * spread:
-            return False
-    return True
-
-
-def candidates(table: Table, kind: str, reading: Reading) -> list[int]:
-    """Return the columns that can be depth, force or time: those that are called so, else those of such a unit."""
-    units = [_unit(table, number, reading, kind) for number in range(len(table.headers))]
-    names = [header.name for header in table.headers]
-    full = [n for n in range(len(names)) if _has_values(table, n)]
-    of_kind = [n for n in full if is_unit_of(units[n], UNITS[kind])]
-    of_kind = [n for n in of_kind if units[n] not in MASSES or is_called(names[n], kind)]
-    of_kind = [n for n in of_kind if kind != "depth" or not is_called(names[n], "deflection")]
-    called = [n for n in full if (n in of_kind or not units[n]) and is_called(names[n], kind)]
-    return sorted(called, key=lambda n: n not in of_kind) or of_kind
-
-
-def _found(table: Table, kind: str, reading: Reading, notes: list[str]) -> int:
-    """Return the column that is unmistakably depth or force."""
-    found = candidates(table, kind, reading)
-    titles = [f"`{_title(table, number)}`" for number in found]
-    if found and _are_equal(table, found, but_for_a_constant=kind == "force"):
-        same = f"; {', '.join(titles[1:])} differs by no more than a constant" if titles[1:] else ""
-        notes.append(f"{kind} is column {titles[0]}{same}")
-        return found[0]
-    what = f"could be {', '.join(titles)}" if found else "is not found"
-    raise ExperimentError(
-        table.file,
-        f"{kind} {what} among {_listed(table)}: name it by header or number in columns of {_SECTION}, and its unit in "
-        f"units if the header has none{_if_bent(table)}{_why_not(table, kind, reading)}{_unused(table)}",
-    )
-
-
-def _why_not(table: Table, kind: str, reading: Reading) -> str:
-    """Return why columns that are called so are none: they have text or nothing, or a unit of another kind."""
-    reasons = []
-    for number, header in enumerate(table.headers):
-        title, unit = _title(table, number), _unit(table, number, reading, kind)
-        if number in table.strange:
-            line, text = table.strange[number]
-            reasons.append(f'`{title}` has text, "{text}" in line {line}')
-        elif is_called(header.name, kind) and not _has_values(table, number):
-            reasons.append(f"`{title}` has no values")
-        elif is_called(header.name, kind) and unit and not is_unit_of(unit, UNITS[kind]):
-            reasons.append(f"`{title}` has the unit {unit}, no unit of {_KINDS[UNITS[kind]]}")
-    return "".join(f"; {reason}" for reason in reasons)
-
-
-def _if_bent(table: Table) -> str:
-    """Return what to do if a spring's deflection is the only force."""
-    is_bent = any(is_called(header.name, "deflection") and is_unit_of(header.unit, "m") for header in table.headers)
-    return "; if the force is the deflection of a spring, name piezo, deflection and spring" if is_bent else ""
-
-
-def _time(table: Table, taken: set[int], reading: Reading, notes: list[str]) -> int | None:
-    """Return the only column that is called time, or has a unit of time; None if there is none, or several."""
-    for number, (line, text) in table.strange.items():
-        if is_called(table.headers[number].name, "time"):
-            notes.append(f'column `{_title(table, number)}` has text, "{text}" in line {line}, and is not read as time')
-    found = [n for n in candidates(table, "time", reading) if n not in taken]
-    without = [n for n in found if not _unit(table, n, reading, "time")]
-    notes += [f"column `{_title(table, n)}` has no unit, and is not read as time: give it in units" for n in without]
-    found = [n for n in found if n not in without]
-    if len(found) > 1:
-        notes.append(f"time could be {', '.join(_title(table, n) for n in found)}: not read; name it in columns")
-    if len(found) != 1:
-        return None
-    notes.append(f"time is column `{_title(table, found[0])}`")
-    return found[0]
-
-
-def _has_values(table: Table, number: int) -> bool:
-    return not bool(np.isnan(table.values[:, number]).all())
-
-
-def _unit(table: Table, number: int, reading: Reading, kind: str) -> str:
-    """Return the unit of a column as text: the header's, that in the study's name of it, or that of `units`."""
-    header = table.headers[number].unit
-    wanted = reading.columns.get(kind)
-    in_name = header_of(wanted).unit if isinstance(wanted, str) else ""
-    return header or in_name or reading.units.get(kind, "")
-
-
-def _in_si(table: Table, number: int, kind: str, reading: Reading, notes: list[str]) -> FloatArray:
-    """Return a column in SI units."""
-    title, si = _title(table, number), UNITS[kind]
-    if number in table.strange:
-        line, text = table.strange[number]
-        raise ExperimentError(
-            table.file, f'"{text}" is no number (for {kind}): correct or remove it', column=title, line=line
-        )
-    if not _has_values(table, number):
-        raise ExperimentError(table.file, f"has no values (for {kind})", column=title)
-    unit = _unit(table, number, reading, kind)
-    if not unit:
-        example = {"m": "mm", "N": "mN", "s": "s"}[si]
-        raise ExperimentError(
-            table.file, f'has no unit: write units = {{{kind} = "{example}"}} in {_SECTION}', column=title
-        )
-    try:
-        factor = factor_of(unit, si)
-    except ValueError as error:
-        raise ExperimentError(table.file, f"cannot be {kind}: {_message(error)}", column=title) from None
-    given = reading.units.get(kind)
-    if given is not None and not np.isclose(factor_of(given, si), factor, rtol=1e-9):
-        raise ExperimentError(
-            table.file, f'has the unit {unit}, but units.{kind} is "{given}": remove the wrong one', column=title
-        )
-    wanted = reading.columns.get(kind)
-    named = header_of(wanted).unit if isinstance(wanted, str) else ""
-    if named and is_unit_of(named, si) and not np.isclose(factor_of(named, si), factor, rtol=1e-9):
-        raise ExperimentError(table.file, f'has the unit {unit}, but columns.{kind} is "{wanted}"', column=title)
-    if unit in MASSES:
-        notes.append(f"{kind} is the weight of a mass: 1 {unit} is {factor:.6g} N")
-    return table.values[:, number] * factor
-
-
-def _message(error: ValueError) -> str:
-    message = getattr(error, "message", None)
-    return str(message()) if callable(message) else str(error)
-
-
-def _check_distinct(table: Table, chosen: dict[str, int]) -> None:
-    """Report a column that is named for two things."""
-    kinds: dict[int, str] = {}
-    for kind, number in chosen.items():
-        if number in kinds:
-            raise ExperimentError(table.file, f"is named for {kinds[number]} and {kind}", column=_title(table, number))
-        kinds[number] = kind
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _without_missing(found: Recorded) -> Recorded:
@@ -274,16 +296,14 @@ def _without_missing(found: Recorded) -> Recorded:
     missing = np.isnan(found.depth) | np.isnan(found.force)
     if found.time is not None:
         missing |= np.isnan(found.time)
-    rows = np.flatnonzero(~missing)
-    if not rows.size:
+    if missing.all():
         raise ExperimentError(found.file, "has no row with depth and force")
-    kept = found.part(rows)
+    kept = found.part(np.flatnonzero(~missing))
     if kept.time is not None and np.ptp(kept.time) == 0:
         kept = replace(kept, time=None).noting(f"time never changes (column `{kept.names['time']}`): not read")
     if kept.time is not None:
         kept = replace(kept, time=kept.time - kept.time[0], began=float(kept.time[0]))
-    count = int(missing.sum())
-    if count:
-        first = int(found.lines[np.flatnonzero(missing)[0]])
+    if count := int(missing.sum()):
+        first = int(found.lines[np.argmax(missing)])
         kept = kept.noting(f"{count} rows without all values, the first in line {first}: left out")
     return kept

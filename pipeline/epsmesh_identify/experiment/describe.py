@@ -5,26 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from epsmesh_identify.experiment.columns import Recorded, candidates
-from epsmesh_identify.experiment.header import is_unit_of
+from epsmesh_identify.experiment.columns import Choice, Recorded
+from epsmesh_identify.experiment.header import written
 from epsmesh_identify.experiment.read import read_curve, whole_curve
-from epsmesh_identify.experiment.reading import ExperimentError, Reading
+from epsmesh_identify.experiment.reading import UNITS, ExperimentError, Reading
 from epsmesh_identify.experiment.segments import cycles_of
 from epsmesh_identify.experiment.signs import signed, signs_of
 from epsmesh_identify.experiment.table import Table, table_of
 from epsmesh_identify.experiment.text import read_lines
-from epsmesh_identify.experiment.words import is_called
 
 _SEPARATORS = {" ": "spaces", "\t": "tabs", ",": "commas", ";": "semicolons", "|": "bars"}
-# Units that people read, from the largest on: the first of which there is one at least.
-_READ = {
-    "depth": ((1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm")),
-    "force": ((1.0, "N"), (1e-3, "mN"), (1e-6, "µN"), (1e-9, "nN")),
-    "time": ((1.0, "s"), (1e-3, "ms")),
-}
-
-# Of columns without a unit, as an example.
-_UNITS = {"depth": "mm", "force": "N", "time": "s"}
 
 
 def describe(path: Path, reading: Reading | None = None) -> str:
@@ -37,31 +27,37 @@ def describe(path: Path, reading: Reading | None = None) -> str:
     """
     reading = reading or Reading()
     table = table_of(read_lines(path), str(path))
-    lines = [_of_table(table, path.name), *_of_columns(table)]
-    head = [
-        "[[measurement]]",
-        f"name = {_text(path.stem)}",
-        f"file = {_text(path.resolve().as_posix())} # or its path from the study's folder",
+    decimal = "commas" if table.layout.decimal == "," else "points"
+    lines = [
+        f"{path.name}: {len(table.lines)} rows of {table.layout.width} columns in lines {table.lines[0]} to "
+        f"{table.lines[-1]}, separated by {_SEPARATORS[table.layout.separator]}, decimal {decimal}",
+        *_of_columns(table),
+        "",
     ]
     whole = None
     try:
         whole = whole_curve(path, reading)
         curve, signs = read_curve(path, reading), signs_of(whole, reading)
     except ExperimentError as error:
-        lines += ["", f"not read yet: {error}"]
-        block = _block(whole, None) if whole else _to_choose(table)
+        lines += [f"not read yet: {error}"]
+        keys = [*_columns(whole), "sign = {depth = 1, force = 1} # check"] if whole else Choice(table).to_paste()
     else:
-        lines += ["", *_of_segments(signed(whole, reading)), *(f"- {note}" for note in curve.notes)]
-        block = _block(whole, signs)
-    return "\n".join([*lines, "", *head, *block, *_to_add(table)])
-
-
-def _of_table(table: Table, name: str) -> str:
-    separator = _SEPARATORS[table.layout.separator]
-    return (
-        f"{name}: {len(table.lines)} rows of {table.layout.width} columns in lines {table.lines[0]} to "
-        f"{table.lines[-1]}, separated by {separator}, decimal {'commas' if table.layout.decimal == ',' else 'points'}"
+        lines += [*_of_segments(signed(whole, reading)), *(f"- {note}" for note in curve.notes)]
+        sign = f"sign = {{depth = {signs[0]}, force = {signs[1]}}}"
+        keys = [*_columns(whole), *([sign] if min(signs) < 0 else [])]
+    of_machine = (
+        '# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it'
     )
+    of_spring = f"machine_stiffness = {_text(table.spring)} # of the spring, if the depth is the way of the piezo"
+    return "\n".join([
+        *lines,
+        "",
+        "[[measurement]]",
+        f"name = {_text(path.stem)}",
+        f"file = {_text(path.resolve().as_posix())} # or its path from the study's folder",
+        *keys,
+        of_spring if table.spring else of_machine,
+    ])  # fmt: skip
 
 
 def _of_columns(table: Table) -> list[str]:
@@ -78,87 +74,25 @@ def _of_columns(table: Table) -> list[str]:
 
 
 def _of_segments(found: Recorded) -> list[str]:
-    """Return a line for each cycle: what its segments are."""
+    """Return a line for each cycle: how many rows its segments have, and over which depths, forces and times."""
     lines = []
     cycles = cycles_of(found.depth, found.time)
     for number, cycle in enumerate(cycles, start=1):
         parts = []
         for segment in ("approach", "hold", "retract"):
-            rows = cycle.rows(segment)
-            if rows.stop > rows.start:
-                parts.append(f"{segment} {_of_part(found.part(rows))}")
+            part = found.part(cycle.rows(segment))
+            columns = {"depth": part.depth, "force": part.force, "time": part.time}
+            if part.lines.size:
+                extents = [written(float(np.ptp(c)), UNITS[k]) for k, c in columns.items() if c is not None]
+                parts.append(f"{segment} of {part.lines.size} rows over {', '.join(extents)}")
         lines.append(f"{f'cycle {number}: ' if len(cycles) > 1 else ''}{'; '.join(parts)}")
     return lines
 
 
-def _of_part(found: Recorded) -> str:
-    """Say how many rows a part has, and over which depths, forces and times."""
-    values = {"depth": found.depth, "force": found.force, "time": found.time}
-    extents = []
-    for kind, column in values.items():
-        if column is not None:
-            extent = float(np.ptp(column))
-            factor, unit = next((one for one in _READ[kind] if extent >= one[0]), _READ[kind][-1])
-            extents.append(f"{extent / factor:.4g} {unit}")
-    return f"of {len(found.depth)} rows over {', '.join(extents)}"
-
-
-def _block(found: Recorded, signs: tuple[int, int] | None) -> list[str]:
-    """Return the keys of a study that reads the file so; without ``signs``, these are to be chosen."""
-    columns = ", ".join(
-        f"{kind} = {header if header.isdecimal() else _text(header)}" for kind, header in found.names.items()
-    )
-    depth, force = signs or (1, 1)
-    sign = f"sign = {{depth = {depth}, force = {force}}}{'' if signs else ' # check'}"
-    return [f"columns = {{{columns}}}", *([sign] if signs is None or min(signs) < 0 else [])]
-
-
-def _to_choose(table: Table) -> list[str]:
-    """Return the keys of a study in which columns are to be chosen: the likely ones are written."""
-    if spring := _of_spring(table):
-        return [f"columns = {{{', '.join(spring)}}} # check"]
-    chosen: dict[str, int] = {}
-    for place, kind in enumerate(("time", "depth", "force")):
-        free = [n for n in candidates(table, kind, Reading()) if n not in {*chosen.values(), *table.strange}]
-        if not free and kind != "time" and place < len(table.headers) and not table.headers[place].text:
-            free = [place]
-        chosen |= {kind: free[0]} if free else {}
-    columns = ", ".join(f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items())
-    units = [f'{kind} = "{_UNITS[kind]}"' for kind, number in chosen.items() if not table.headers[number].unit]
-    lacking = [kind for kind in ("depth", "force") if kind not in chosen]
-    hint = f"; no column has the name and unit of {' and '.join(lacking)}" if lacking else ""
-    return [
-        f"columns = {{{columns}}} # check: header or number of each column{hint}"
-        if chosen
-        else f"# columns = {{depth = …, force = …}}{hint}",
-        *([f"units = {{{', '.join(units)}}} # check"] if units else []),
-    ]
-
-
-def _of_spring(table: Table) -> list[str]:
-    """Return the keys of the way of a piezo, and the deflection of a spring; none if the table has no deflection."""
-    lengths = [n for n, header in enumerate(table.headers) if is_unit_of(header.unit, "m")]
-    bent = [n for n in lengths if is_called(table.headers[n].name, "deflection")]
-    ways = [n for n in lengths if n not in bent]
-    if not (bent and ways):
-        return []
-    chosen = {"piezo": ways[0], "deflection": bent[0]}
-    return [
-        *(f"{kind} = {_of_column(table, number)}" for kind, number in chosen.items()),
-        f"spring = {_text(table.spring or '0.05 N/m')}",
-    ]
-
-
-def _of_column(table: Table, number: int) -> str:
-    text = table.headers[number].text
-    return _text(text) if text else f"{number + 1}"
-
-
-def _to_add(table: Table) -> list[str]:
-    """Return the lines that a machine which yields needs."""
-    if table.spring:
-        return [f"machine_stiffness = {_text(table.spring)} # of the spring, if the depth is the way of the piezo"]
-    return ['# machine_stiffness = "60 N/mm" # of machine and load cell; or a range, or "unknown"; rigid without it']
+def _columns(found: Recorded) -> list[str]:
+    """Return the key of a study that reads the columns so."""
+    names = (f"{kind} = {header if header.isdecimal() else _text(header)}" for kind, header in found.names.items())
+    return [f"columns = {{{', '.join(names)}}}"]
 
 
 def _text(text: str) -> str:

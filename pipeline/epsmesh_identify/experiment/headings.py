@@ -18,28 +18,43 @@ _PURE, _LETTERS = frozenset({"%", "1", "-", ""}), 6
 _PREFIX = re.compile(r"\s*\w+:\s+")
 # Headers after the last column, of which rows have nothing.
 _OF_NONE = frozenset({"", "comment", "comments", "note", "notes", "remark", "remarks"})
-_OTHERS = ("\t", ";", ",", "  ")
+# Between headers of columns that spaces separate, with spaces in them.
+_BETWEEN = re.compile(r"\s*[\t;,]\s*|\s{2,}")
 
 
 def headers_of(before: Sequence[str], layout: Layout, values: FloatArray) -> tuple[tuple[Header, ...], str]:
     """Return the headers, from the lines before the rows: names, and units there or in a row of their own.
 
-    Besides, return a note on a line of headers that has one more or fewer than there are columns of ``values``.
+    Besides, return a note on a line of headers that has one more or fewer than there are columns of ``values``. Rows
+    may end with a separator, or begin with a name or number that has no header; otherwise no header is used.
     """
-    width = layout.width
+    rows, width = values.shape
+    names, units, note = [""] * width, [""] * width, ""
     for count in (width, width - 1, width + 1):
-        names, units = _lines(before, layout, count)
-        if not (names or units):
+        above, below = _lines(before, layout, count)
+        if not (above or below):
             continue
+        found = above or [""] * count, below or _of_labview(before, layout, count)
+        is_first = np.isnan(values[:, 0]).all() or np.array_equal(values[:, 0], np.arange(1, rows + 1))
         if count == width:
-            return _named(names or [""] * width, units or _of_labview(before, layout)), ""
-        return _placed(names or [""] * count, units, values)
-    return _named([""] * width), ""
+            names, units = found
+        elif count < width and np.isnan(values[:, -1]).all():
+            names, units = ([*texts, ""] for texts in found)
+        elif count < width and is_first:
+            names, units = (["", *texts] for texts in found)
+            note = f"the first column has the names of rows: its header is not among the {count}"
+        else:
+            note = f"{width} columns have {count} headers, which are not used: name columns by number, and their units"
+        break
+    return tuple(map(_with_unit, names, units)), note
 
 
-def has_headers(before: Sequence[str], layout: Layout) -> bool:
-    """Tell whether a line before the rows has as many headers as there are columns, or one fewer."""
-    return any(any(_lines(before, layout, width)) for width in (layout.width, layout.width - 1))
+def is_short_of(before: Sequence[str], layout: Layout) -> int:
+    """Return the number of headers of a line with at least half as many as there are columns, but fewer; 0 for none."""
+    for fields in map(layout.fields, before):
+        if 1 < len(fields) < layout.width <= 2 * len(fields) and not any(map(layout.is_number, fields)):
+            return len(fields)
+    return 0
 
 
 def _lines(before: Sequence[str], layout: Layout, width: int) -> tuple[list[str], list[str]]:
@@ -47,42 +62,19 @@ def _lines(before: Sequence[str], layout: Layout, width: int) -> tuple[list[str]
     units: list[str] = []
     for line in reversed([line for line in before if line.strip()][-_NEAR:]):
         fields = _fields(line, layout, width)
-        if fields is None:
-            continue
-        if not units and _are_units(fields):
+        if fields and not units and _are_units(fields):
             units = [field.strip("()[]{} ") for field in fields]
-            continue
-        return fields, units
+        elif fields:
+            return fields, units
     return [], units
 
 
-def _of_labview(before: Sequence[str], layout: Layout) -> list[str]:
-    """Return the units of the columns of LabVIEW's measurement files, which are in lines of labels; [] for none."""
+def _of_labview(before: Sequence[str], layout: Layout, width: int) -> list[str]:
+    """Return the units of the columns of LabVIEW's measurement files, which are in lines of labels; "" for none."""
     rows = {fields[0]: fields[1:] for line in before if (fields := layout.fields(line))}
-    units, along = rows.get("Y_Unit_Label", []), rows.get("X_Dimension", [""])
-    found = ["s" if along[:1] == ["Time"] else "", *units, *[""] * layout.width]
-    return found[: layout.width] if any(units) else []
-
-
-def _named(fields: Sequence[str], units: Sequence[str] = ()) -> tuple[Header, ...]:
-    return tuple(_with_unit(field, units[number] if any(units) else "") for number, field in enumerate(fields))
-
-
-def _placed(names: list[str], units: list[str], values: FloatArray) -> tuple[tuple[Header, ...], str]:
-    """Return the headers of columns whose line of headers has one more, or one fewer, and a note on it.
-
-    Rows may end with a separator, or begin with a name or number that has no header. Otherwise no header is sure.
-    """
-    rows, width = values.shape
-    if len(names) < width:
-        if np.isnan(values[:, -1]).all():
-            return _named([*names, ""], [*units, ""]), ""
-        first = values[:, 0]
-        if np.isnan(first).all() or np.array_equal(first, np.arange(1, rows + 1)):
-            note = f"the first column has the names of rows: its header is not among the {len(names)}"
-            return _named(["", *names], ["", *units]), note
-    note = f"{width} columns have {len(names)} headers, which are not used: name columns by number, and their units"
-    return _named([""] * width), note
+    units = rows.get("Y_Unit_Label", [])
+    along = "s" if any(units) and rows.get("X_Dimension", [""])[:1] == ["Time"] else ""
+    return [along, *units, *[""] * width][:width]
 
 
 def _with_unit(text: str, unit: str) -> Header:
@@ -90,29 +82,24 @@ def _with_unit(text: str, unit: str) -> Header:
     return header if header.unit or not unit else Header(f"{text} ({unit})", text, unit)
 
 
-def _fields(line: str, layout: Layout, width: int) -> list[str] | None:
-    """Return the ``width`` fields of a line of headers; None if it has another number of them, or numbers."""
+def _fields(line: str, layout: Layout, width: int) -> list[str]:
+    """Return the ``width`` fields of a line of headers; [] if it has another number of them, or numbers."""
     bare = without_mark(line)
-    texts = dict.fromkeys((bare, _PREFIX.sub("", bare, count=1)))
-    for text in texts:
-        for fields in (*_ways(text, layout, width), *_ways(text, layout, width + 1)):
-            if len(fields) == width + 1 and fields[-1].casefold() in _OF_NONE:
-                fields.pop()
-            if len(fields) == width and not any(map(layout.is_number, fields)):
-                return fields
-    return None
+    for text in dict.fromkeys((bare, _PREFIX.sub("", bare, count=1))):
+        for fields in _ways(text.strip(), layout) if layout.separator == " " else [layout.fields(text)]:
+            kept = fields[:-1] if len(fields) == width + 1 and fields[-1].casefold() in _OF_NONE else fields
+            if len(kept) == width and len(fields) > 1 and not any(map(layout.is_number, kept)):
+                return kept
+    return []
 
 
-def _ways(text: str, layout: Layout, width: int) -> list[list[str]]:
-    """Return the fields of a line, of one in columns in several ways: spaces are also within headers."""
-    if layout.separator != " " or not text.strip():
-        return [fields for fields in [layout.fields(text)] if len(fields) == width and width > 1]
+def _ways(text: str, layout: Layout) -> list[list[str]]:
+    """Return the fields of a line above columns that spaces separate, in several ways: headers may have spaces, too."""
     if '"' in text:
-        fields = next(csv.reader([text.strip()], delimiter=" ", skipinitialspace=True))
+        fields = next(csv.reader([text], delimiter=" ", skipinitialspace=True))
         return [[field for field in fields if field]]
     joined = re.sub(r"\s+([(\[{/])\s*", r"\1", text)  # "depth (mm)" is one header
-    others = [[field.strip() for field in text.strip().split(other) if field.strip()] for other in _OTHERS]
-    return [fields for fields in (text.split(), joined.split(), *others) if len(fields) == width]
+    return [layout.fields(text), layout.fields(joined), _BETWEEN.split(text)]
 
 
 def _are_units(fields: Sequence[str]) -> bool:

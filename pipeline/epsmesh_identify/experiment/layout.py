@@ -3,12 +3,14 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+from epsmesh_identify.experiment.clock import is_clock, is_date
 
 # Whitespace comes last: lines with another separator may have spaces, too.
 _SEPARATORS = ("\t", ";", ",", "|", " ")
-_DECIMALS = (".", ",")
 _NUMBERS = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+(,\d+)?|,\d+)([eE][+-]?\d+)?"),
@@ -23,76 +25,54 @@ _SAMPLE = 200
 class Layout:
     """Separator (a space is any whitespace), decimal sign, and the number of columns."""
 
-    separator: str
-    decimal: str
-    width: int
+    separator: str = ","
+    decimal: str = "."
+    width: int = 0
 
     def fields(self, line: str) -> list[str]:
         """Return the fields of a line, without quotation marks and spaces around them."""
-        return splitter(self.separator)(line)
+        if self.separator == " ":
+            return line.split()
+        if '"' in line:
+            line_of_fields = csv.reader([line], delimiter=self.separator, skipinitialspace=True)
+            return [field.strip() for field in next(line_of_fields)]
+        return [field.strip() for field in line.split(self.separator)]
 
     def is_number(self, text: str) -> bool:
         """Tell whether a field is a number."""
         return _NUMBERS[self.decimal].fullmatch(text) is not None
 
-    def is_row(self, fields: Sequence[str]) -> bool:
-        """Tell whether fields are a row of numbers; some may be missing."""
+    def numbers(self, fields: Sequence[str]) -> float:
+        """Return the share of fields with numbers or without a value, of a row that has one number and no text, or two.
+
+        Texts such as names and clock times are in columns of their own.
+        """
         numbers = sum(map(self.is_number, fields))
-        return (
-            len(fields) == self.width
-            and numbers > 0
-            and all(self.is_number(field) or field.lower() in MISSING for field in fields)
-        )
+        missing = sum(field.lower() in MISSING for field in fields)
+        is_row = numbers > 1 or (numbers > 0 and numbers + missing == len(fields) > 1)
+        return (numbers + missing) / len(fields) if is_row else 0.0
 
-
-def splitter(separator: str) -> Callable[[str], list[str]]:
-    """Return the function that splits a line into its fields."""
-
-    def split(line: str) -> list[str]:
-        if separator == " ":
-            return line.split()
-        if '"' in line:
-            return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
-        return [field.strip() for field in line.split(separator)]
-
-    return split
+    def is_row(self, line: str) -> bool:
+        """Tell a row of numbers, dates and clock times; where a column has text, one of them for the most part."""
+        fields = self.fields(line)
+        if len(fields) != self.width or not (share := self.numbers(fields)):
+            return False
+        return share + sum(is_clock(field) or is_date(field) for field in fields) / self.width > 0.5
 
 
 def find_layout(lines: Sequence[str]) -> Layout | None:
     """Return the layout with which most lines are rows of equal width; None if there is none.
 
-    Every separator and decimal sign is tried on each of the sampled lines. A column of text, such as a name or a clock
-    time, is no number in any layout: without rows of numbers alone, those with the largest share of numbers count.
+    Every separator and decimal sign is tried on each of the sampled lines.
     """
-    step = max(1, len(lines) // _SAMPLE)
-    sample = [line for line in lines[::step] if line.strip()]
+    sample = [line for line in lines[:: max(1, len(lines) // _SAMPLE)] if line.strip()]
     is_quoted = any('"' in line for line in sample)  # then a comma may be in a number and between numbers
-    best, found = (0, 0.0), None
-    for separator in _SEPARATORS:
-        rows = [row for row in map(splitter(separator), sample) if len(row) > 1]
-        for decimal in _DECIMALS:
-            if not rows or (separator == decimal and not is_quoted):
-                continue
-            score, width = _score(rows, decimal)
-            if score > best:
-                best, found = score, Layout(separator, decimal, width)
+    best, found = 0.0, None
+    for separator, decimal in product(_SEPARATORS, _NUMBERS):
+        layout, shares = Layout(separator, decimal), Counter[int]()
+        for fields in map(layout.fields, sample) if separator != decimal or is_quoted else ():
+            shares[len(fields)] += layout.numbers(fields)
+        width, share = max(shares.items(), key=lambda one: one[1], default=(0, 0.0))
+        if share > best:
+            best, found = share, replace(layout, width=width)
     return found
-
-
-def _score(rows: Sequence[Sequence[str]], decimal: str) -> tuple[tuple[int, float], int]:
-    """Return how many rows of equal width have numbers alone, and the sum of shares of numbers; and that width."""
-    number = _NUMBERS[decimal]
-    whole: Counter[int] = Counter()
-    shares: Counter[int] = Counter()
-    for row in rows:
-        numbers = sum(number.fullmatch(field) is not None for field in row)
-        missing = sum(field.lower() in MISSING for field in row)
-        width = len(row)
-        if numbers + missing == width and numbers:
-            whole[width] += 1
-        if numbers > 1:
-            shares[width] += (numbers + missing) / width  # type: ignore[assignment]
-    if not whole and not shares:
-        return (0, 0.0), 0
-    width = max({*whole, *shares}, key=lambda w: (whole[w], shares[w]))
-    return (whole[width], float(shares[width])), width

@@ -11,7 +11,7 @@ import numpy as np
 from epsmesh.arrays import BoolArray
 from epsmesh.files import matching
 from epsmesh_identify.experiment.checks import check_contact, check_count, check_size, without_saturation
-from epsmesh_identify.experiment.columns import Recorded, recorded
+from epsmesh_identify.experiment.columns import Choice, Recorded
 from epsmesh_identify.experiment.curve import Curve
 from epsmesh_identify.experiment.order import check_order
 from epsmesh_identify.experiment.reading import ExperimentError, Reading, Window
@@ -99,7 +99,7 @@ def read_curve(path: Path, reading: Reading) -> Curve:
 
 def whole_curve(path: Path, reading: Reading) -> Recorded:
     """Return all rows of a file as recorded, in order."""
-    found = recorded(table_of(read_lines(path), str(path)), reading)
+    found = Choice(table_of(read_lines(path), str(path)), reading).recorded()
     return check_order(check_count(found, "the file"))
 
 

@@ -1,9 +1,9 @@
 """Signs of depth and force with which both are positive where the tool presses: found where all evidence agrees."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh_identify.experiment.checks import check_rise
@@ -11,12 +11,12 @@ from epsmesh_identify.experiment.columns import Recorded
 from epsmesh_identify.experiment.reading import ExperimentError, Reading
 from epsmesh_identify.experiment.segments import turning_points
 
-# Shares of the depth at both ends of a curve that are compared, and by how much the contact's end must vary more, or
-# have the larger force: an offset of the force makes the latter less sure.
-_END, _CLEAR, _CLEAR_SIZE = 0.25, 2.0, 10.0
-_STEP, _FEWEST, _BETWEEN = 0.02, 4, (0.1, 0.9)
-# Strokes turn by this share of the depth's range, and go over it but for this share at each end; places on them.
-_TURN, _SHORT, _PLACES = 0.1, 0.1, 80
+# Shares of the depth at both ends of a curve that are compared: all of contact or air there, and its last rows.
+_END, _LAST = 0.25, 0.05
+# How many times the force must vary more at the contact's end, or be larger: an offset makes the latter less sure.
+_CLEAR, _CLEAR_SIZE = 2.0, 10.0
+# Strokes turn by this share of the depth's range; a curve that returns ends within it of its first depth. Places.
+_TURN, _PLACES, _BETWEEN = 0.1, 80, (0.1, 0.9)
 
 
 def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
@@ -30,14 +30,14 @@ def signs_of(found: Recorded, reading: Reading) -> tuple[int, int]:
     """
     ends = {reading.depth_sign} if reading.depth_sign else _deep_ends(found.depth, found.force)
     if len(ends) > 1:
-        low, high = sorted(float(np.median(found.force[_last(found.depth, end)])) for end in (-1, 1))
+        low, high = sorted(float(np.median(found.force[_near(found.depth, end, _END)])) for end in (-1, 1))
         check_rise(found, low, high)
         why = "it is not clear at which end of the depths the tool presses: write sign = {depth = 1, force = 1} in "
         why += "[[measurement]] if both are largest there, else -1 for what is smallest"
         raise ExperimentError(found.file, why, column=found.depth_name)
-    depth = next(iter(ends), 0) or _by_time(found.depth, found.force)
+    depth = next(iter(ends), 0) or _first_way(found.depth, found.force)
     way, force = _mean_stroke(found.depth * depth, found.force)
-    deep, shallow = (np.median(force[end]) for end in (way >= way.max() - 0.05 * np.ptp(way), _last(way, -1)))
+    deep, shallow = np.median(force[_near(way, 1, _LAST)]), np.median(force[_near(way, -1, _END)])
     return depth, reading.force_sign or (-1 if deep < shallow else 1)
 
 
@@ -66,80 +66,48 @@ def _deep_ends(depth: FloatArray, force: FloatArray) -> set[int]:
     A curve that begins and ends at the same depth is deep where it turns; the force varies in contact, not in air.
     Where neither says anything, as without air, the end with a much larger force is the deep one.
     """
-    rows = _moving(depth)
-    depth, force = depth[rows], force[rows]
+    low, high = depth.min() + _TURN * np.ptp(depth), depth.max() - _TURN * np.ptp(depth)
+    turned = int((depth[[0, -1]] < low).all()) - int((depth[[0, -1]] > high).all())
     way, mean = _mean_stroke(depth, force)
-    varies = _clear_end(_spread(way, mean, -1), _spread(way, mean, 1), _CLEAR)
-    is_large = _clear_end(_size(way, mean, -1), _size(way, mean, 1), _CLEAR_SIZE)
-    return {_turned_to(depth), varies} - {0} or {is_large} - {0}
+    ends = {turned, _clear_end([_spread(way, mean, end) for end in (-1, 1)], _CLEAR)} - {0}
+    sizes = [float(abs(np.median(mean[_near(way, end, _LAST)]))) for end in (-1, 1)]
+    return ends or {_clear_end(sizes, _CLEAR_SIZE)} - {0}
 
 
-def _by_time(depth: FloatArray, force: FloatArray) -> int:
+def _first_way(depth: FloatArray, force: FloatArray) -> int:
     """Return the sign with which the depth rises from the first row to the one of the largest change of force."""
     return -1 if depth[int(np.argmax(np.abs(force - force[0])))] < depth[0] else 1
 
 
-def _clear_end(low: float, high: float, clear: float) -> int:
+def _clear_end(values: list[float], clear: float) -> int:
     """Return which of two ends has the larger value, -1 or 1; 0 if it is not so many times as large."""
-    return 0 if max(low, high) <= clear * min(low, high) else 1 if high > low else -1
-
-
-def _turned_to(depth: FloatArray) -> int:
-    """Return the end, -1 or 1, at which a curve turns that begins and ends at the other one; 0 if it does not."""
-    low, range_ = float(depth.min()), float(np.ptp(depth))
-    ends = (depth[[0, -1]] - low) / range_
-    return 1 if (ends < _SHORT).all() else -1 if (ends > 1 - _SHORT).all() else 0
+    low, high = values
+    return 0 if max(values) <= clear * min(values) else 1 if high > low else -1
 
 
 def _mean_stroke(depth: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return depths, and the mean of the forces of strokes to both directions: a drift cancels but for a constant.
+    """Return places along the depth, and the mean of the forces there of strokes to both directions.
 
-    A curve of one stroke is as it was. Strokes that do not go over the whole depth are left out.
+    A drift of the force cancels but for a constant. Where strokes go to one direction only, their forces alone count.
     """
-    turns = [row for row in turning_points(depth, _TURN * float(np.ptp(depth))) if 0 < row < len(depth) - 1]
-    strokes = [slice(a, b + 1) for a, b in pairwise([0, *turns, len(depth) - 1])]
-    whole = [rows for rows in strokes if np.ptp(depth[rows]) >= (1 - 2 * _SHORT) * np.ptp(depth)]
-    if len(strokes) == 1 or not whole:
-        return depth, force
-    low, high = (side(end(depth[rows]) for rows in whole) for side, end in ((max, np.min), (min, np.max)))
-    way = np.linspace(low, high, _PLACES)
-    means = []
-    for sign in (-1, 1):
-        along = [rows for rows in whole if sign * (depth[rows][-1] - depth[rows][0]) > 0]
-        orders = [np.argsort(depth[rows], kind="stable") for rows in along]
-        each = [
-            np.interp(way, depth[rows][order], force[rows][order]) for rows, order in zip(along, orders, strict=True)
-        ]
-        means += [np.mean(each, axis=0)] if each else []
-    return way, np.asarray(np.mean(means, axis=0))
+    turns = turning_points(depth, _TURN * float(np.ptp(depth)))
+    stroke = np.searchsorted([row for row in turns if 0 < row < len(depth) - 1], np.arange(len(depth))) % 2
+    place = np.minimum(_PLACES * (depth - depth.min()) / np.ptp(depth), _PLACES - 1).astype(int)
+    rows = pd.DataFrame({"depth": depth, "force": force}).groupby([place, stroke]).mean().unstack()
+    both = rows.dropna() if len(rows.dropna()) > _PLACES / 2 else rows
+    return both["depth"].mean(axis=1).to_numpy(), both["force"].mean(axis=1).to_numpy()
 
 
-def _moving(depth: FloatArray) -> list[int]:
-    """Return rows between which the depth changes by a small share of its range: a hold has one row only."""
-    least, last, rows = _STEP * float(np.ptp(depth)), depth[0], [0]
-    for row, value in enumerate(depth.tolist()):
-        if abs(value - last) > least:
-            last = value
-            rows.append(row)
-    return rows
-
-
-def _last(along: FloatArray, end: int) -> BoolArray:
-    """Return which depths are in the last quarter towards an ``end``."""
-    return end * along >= (end * along).max() - _END * np.ptp(along)
+def _near(depth: FloatArray, end: int, share: float) -> BoolArray:
+    """Return which depths are within a ``share`` of their range of an ``end``: 1 for the largest, -1 for the least."""
+    near: BoolArray = end * depth >= (end * depth).max() - share * np.ptp(depth)
+    return near
 
 
 def _spread(depth: FloatArray, force: FloatArray, end: int) -> float:
     """Return by how much the force varies in the last quarter of the depths towards an ``end``: by slope or range."""
-    near = _last(depth, end)
-    if near.sum() < _FEWEST or np.ptp(depth[near]) == 0:
+    near = _near(depth, end, _END)
+    if near.sum() < 3:
         return 0.0
     slope = np.polyfit(depth[near] - depth[near].mean(), force[near], 1)[0]
-    between = np.ptp(np.quantile(force[near], _BETWEEN))
-    return float(max(abs(slope) * np.ptp(depth[near]), between))
-
-
-def _size(depth: FloatArray, force: FloatArray, end: int) -> float:
-    """Return the size of the force at the last depths towards an ``end``: without air, it is small at first touch."""
-    along = end * depth
-    return float(abs(np.median(force[along >= along.max() - 0.05 * np.ptp(along)])))
+    return float(max(abs(slope) * np.ptp(depth[near]), np.ptp(np.quantile(force[near], _BETWEEN))))

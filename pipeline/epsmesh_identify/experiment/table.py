@@ -14,7 +14,7 @@ from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.units import unit_factor
 from epsmesh_identify.experiment.clock import is_clock, is_date, seconds
 from epsmesh_identify.experiment.header import Header, is_comment
-from epsmesh_identify.experiment.headings import has_headers, headers_of
+from epsmesh_identify.experiment.headings import headers_of, is_short_of
 from epsmesh_identify.experiment.layout import MISSING, Layout, find_layout
 from epsmesh_identify.experiment.reading import ExperimentError
 
@@ -48,7 +48,7 @@ class Table:
     lines: IntArray
     strange: dict[int, tuple[int, str]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    layout: Layout = field(default_factory=lambda: Layout(",", ".", 0))
+    layout: Layout = field(default_factory=Layout)
     spring: str = ""
     unused: str = ""
 
@@ -65,73 +65,65 @@ def table_of(lines: Sequence[str], file: str) -> Table:
     begin = _begin(lines, layout)
     if begin is None:
         raise ExperimentError(file, "has no row of numbers")
-    kept, odd = _rows(lines, begin, layout)
-    _check_decimals(lines[:begin], layout, file, begin)
+    full = [number for number in range(begin, len(lines)) if lines[number].strip()]
+    kept = [number for number in full if _width(lines[number], layout) == layout.width]
+    odd = sorted(set(full).difference(kept))
+    strange: dict[int, tuple[int, str]] = {}
+    values, clocks = _values([lines[number] for number in kept], layout, np.array(kept) + 1, strange)
+    headers, of_headers = headers_of(lines[:begin], layout, values)
+    has_names = any(header.text for header in headers)
+    if not has_names and not of_headers and layout.separator == "," and (count := is_short_of(lines[:begin], layout)):
+        why = f"has {layout.width} columns, and a header of {count}: decimal commas are not distinguishable from "
+        raise ExperimentError(file, f"{why}commas between columns; save it with semicolons", line=begin + 1)
     wrong = [number for number in odd if not is_comment(lines[number])]
     if len(wrong) > max(1, _MOST_ODD * len(kept)):
         width = len(layout.fields(lines[wrong[0]]))
         raise ExperimentError(file, f"has {width} columns, others have {layout.width}", line=wrong[0] + 1)
     notes = [f"{_of_lines(odd)} no row of {layout.width} columns: left out"] if odd else []
-    if spring := spring_of(lines[:begin]):
+    if spring := _spring_of(lines[:begin]):
         notes.append(f"the header has a spring constant of {spring}: {_OF_SPRING}")
-    numbers = np.array(kept) + 1
-    values, strange, clocks = _values([lines[n] for n in kept], layout, numbers)
-    headers, of_headers = headers_of(lines[:begin], layout, values)
     notes += [of_headers] if of_headers else []
-    headers = tuple(replace(one, unit="s") if n in clocks else one for n, one in enumerate(headers))
-    unused = "" if any(header.text for header in headers) else of_headers
-    return Table(file, headers, values, numbers, strange, tuple(notes), layout, spring, unused)
+    return Table(
+        file,
+        tuple(replace(one, unit="s") if number in clocks else one for number, one in enumerate(headers)),
+        values,
+        np.array(kept) + 1,
+        strange,
+        tuple(notes),
+        layout,
+        spring,
+        "" if has_names else of_headers,
+    )
 
 
-def spring_of(before: Sequence[str]) -> str:
+def _spring_of(before: Sequence[str]) -> str:
     """Return the spring constant that the lines above a table have, as a study writes it; "" for none."""
-    for line in before:
-        if found := _SPRING.search(line):
-            unit = found["unit"] or "N/m"
-            try:
-                return f"{found['value']} {unit}" if unit_factor(unit, "N/m") > 0 < float(found["value"]) else ""
-            except ValueError:
-                return ""
-    return ""
+    found = next(filter(None, map(_SPRING.search, before)), None)
+    unit = (found and found["unit"]) or "N/m"
+    try:
+        return f"{found['value']} {unit}" if found and unit_factor(unit, "N/m") > 0 < float(found["value"]) else ""
+    except ValueError:
+        return ""
 
 
 def _begin(lines: Sequence[str], layout: Layout) -> int | None:
     """Return the first line of the rows: a summary above them has fewer in a row. None if there is no row."""
-    first, run = None, 0
-    for number, line in enumerate(lines):
-        if not line.strip():
-            continue
-        run = run + 1 if _is_data(layout, line) else 0
-        if run == 1:
-            start = number
-            first = number if first is None else first
-        if run == _ROWS:
-            return start
+    full = [number for number, line in enumerate(lines) if line.strip()]
+    rows: list[int] = []  # one after the other, up to the line
+    first = None
+    for number in full:
+        rows = [*rows, number] if layout.is_row(lines[number]) else []
+        first = rows[0] if rows and first is None else first
+        if len(rows) == _ROWS:
+            return rows[0]
     return first
 
 
-def _is_data(layout: Layout, line: str) -> bool:
-    """Tell a row of numbers, dates and clock times; where a column has text, one of them for the most part."""
-    fields = layout.fields(line)
-    if len(fields) != layout.width:
-        return False
-    numbers = sum(map(layout.is_number, fields))
-    times = sum(is_clock(field) or is_date(field) for field in fields)
-    return layout.is_row(fields) or (numbers > 1 and numbers + times > layout.width / 2)
-
-
-def _rows(lines: Sequence[str], begin: int, layout: Layout) -> tuple[list[int], list[int]]:
-    """Return which lines from ``begin`` on have the right number of columns, and which others have text."""
-    kept: list[int] = []
-    odd: list[int] = []
-    for number in range(begin, len(lines)):
-        line = lines[number]
-        if not line.strip():
-            continue
-        is_plain = '"' not in line and layout.separator != " "
-        width = line.count(layout.separator) + 1 if is_plain else len(layout.fields(line))
-        (kept if width == layout.width and not is_comment(line) else odd).append(number)
-    return kept, odd
+def _width(line: str, layout: Layout) -> int:
+    """Return the number of fields of a line; 0 of a comment."""
+    is_plain = '"' not in line and layout.separator != " "
+    width = line.count(layout.separator) + 1 if is_plain else len(layout.fields(line))
+    return 0 if is_comment(line) else width
 
 
 def _of_lines(odd: Sequence[int]) -> str:
@@ -141,9 +133,9 @@ def _of_lines(odd: Sequence[int]) -> str:
 
 
 def _values(
-    rows: Sequence[str], layout: Layout, lines: IntArray
-) -> tuple[FloatArray, dict[int, tuple[int, str]], set[int]]:
-    """Return the numbers of rows, the first text that is none of each column, and the columns that have clock times."""
+    rows: Sequence[str], layout: Layout, lines: IntArray, strange: dict[int, tuple[int, str]]
+) -> tuple[FloatArray, set[int]]:
+    """Return the numbers of rows, and the columns that have clock times; ``strange`` gets texts that are neither."""
     separator = r"\s+" if layout.separator == " " else layout.separator
     if any('"' in row for row in rows):
         rows, separator = [_UNIT.join(layout.fields(row)) for row in rows], _UNIT
@@ -159,44 +151,35 @@ def _values(
         skip_blank_lines=False,
         low_memory=False,
     )
-    found = np.empty(frame.shape)
-    strange: dict[int, tuple[int, str]] = {}
-    clocks: set[int] = set()
-    dates = [text for text in (frame[number].map(str).str.strip() for number in frame) if is_date(text.iloc[0])]
-    for number in range(layout.width):
-        column = frame[number]
-        if not is_numeric_dtype(column) or is_bool_dtype(column):
-            text = column.map(str).str.strip()
-            if is_clock(text.iloc[0]):
-                is_apart = len(dates) == 1 and is_clock(f"{dates[0].iloc[0]} {text.iloc[0]}")
-                found[:, number] = seconds(dates[0] + " " + text if is_apart else text)
-                clocks.add(number)
-                continue
-            plain = text.str.replace(",", ".", regex=False) if layout.decimal == "," else text
-            numbers = pd.to_numeric(plain, errors="coerce")
-            wrong = numbers.isna() & column.notna() & ~text.str.lower().isin(MISSING)
-            if layout.decimal == ",":  # a point is for thousands, or another decimal sign
-                wrong |= text.str.contains(".", regex=False) & column.notna()
-            if wrong.any():
-                first = int(np.argmax(wrong.to_numpy()))
-                strange[number] = (int(lines[first]), str(text.iloc[first])[:_QUOTED])
-            column = numbers
-        found[:, number] = column.to_numpy(float)
-    found[~np.isfinite(found)] = np.nan
-    return found, strange, clocks
+    is_text = [not is_numeric_dtype(frame[number]) or is_bool_dtype(frame[number]) for number in frame]
+    texts = {number: frame[number].map(str).str.strip() for number in np.flatnonzero(is_text).tolist()}
+    clocks = {number for number, text in texts.items() if is_clock(text.iloc[0])}
+    dates = [text + " " for text in texts.values() if is_date(text.iloc[0])]
+    for number, text in texts.items():
+        if number not in clocks:
+            frame[number] = _numbers(number, frame[number], text, layout, lines, strange)
+        elif len(dates) == 1 and is_clock(dates[0].iloc[0] + text.iloc[0]):
+            frame[number] = seconds(dates[0] + text)
+        else:
+            frame[number] = seconds(text)
+    found = frame.to_numpy(float)
+    return np.where(np.isfinite(found), found, np.nan), clocks
 
 
-def _check_decimals(before: Sequence[str], layout: Layout, file: str, begin: int) -> None:
-    """Report numbers with decimal commas between which there are commas, too."""
-    if layout.separator != "," or has_headers(before, layout):
-        return
-    for line in before:
-        fields = layout.fields(line)
-        is_header = len(fields) > 1 and not any(map(layout.is_number, fields))
-        if is_header and len(fields) < layout.width <= 2 * len(fields):
-            raise ExperimentError(
-                file,
-                f"has {layout.width} columns, and a header of {len(fields)}: decimal commas are not distinguishable "
-                "from commas between columns; save it with semicolons",
-                line=begin + 1,
-            )
+def _numbers(
+    number: int,
+    column: "pd.Series[str]",
+    text: "pd.Series[str]",
+    layout: Layout,
+    lines: IntArray,
+    strange: dict[int, tuple[int, str]],
+) -> "pd.Series[float]":
+    """Return the numbers of a column with texts, of which ``strange`` gets the first that does not mean missing."""
+    is_comma = layout.decimal == ","  # then a point is for thousands, or another decimal sign
+    numbers = pd.to_numeric(text.str.replace(",", ".", regex=False) if is_comma else text, errors="coerce")
+    wrong = numbers.isna() & ~text.str.lower().isin(MISSING) | (text.str.contains(".", regex=False) & is_comma)
+    wrong &= column.notna()
+    if wrong.any():
+        first = int(np.argmax(wrong.to_numpy()))
+        strange[number] = (int(lines[first]), str(text.iloc[first])[:_QUOTED])
+    return numbers
