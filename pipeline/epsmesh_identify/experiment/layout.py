@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -69,7 +69,7 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
     is_quoted = any('"' in line for line in sample)  # then a comma may be in a number and between numbers
     best, found = 0.0, None
     for separator, decimal in product(_SEPARATORS, _NUMBERS):
-        layout, shares = Layout(separator, decimal), Counter[int]()
+        layout, shares = Layout(separator, decimal), defaultdict[int, float](float)
         for fields in map(layout.fields, sample) if separator != decimal or is_quoted else ():
             shares[len(fields)] += layout.numbers(fields)
         width, share = max(shares.items(), key=lambda one: one[1], default=(0, 0.0))

@@ -73,7 +73,7 @@ ERRORS = {
     "duplicate columns": (
         {**GOOD, "Depth (mm)": DEPTH}, {}, {"columns": {"depth": "depth (mm)"}}, ["several columns", "2, 4"],
     ),
-    "two depths": ({**GOOD, "piezo (mm)": DEPTH}, {}, {}, ["depth could be", "`piezo (mm)`", "write in [[measurement]]"]),
+    "two depths": ({**GOOD, "piezo (mm)": DEPTH}, {}, {}, ["depth could be", "`piezo (mm)`", "write in [[meas"]),
     "no header": (GOOD, {"change": lambda lines: lines[1:]}, {}, ["depth is not found", "number 1"]),
     "a word among numbers": (
         GOOD, {"change": cell(149, 2, "OVERLOAD")}, {}, ["line 150", "`force (mN)`", '"OVERLOAD"'],
