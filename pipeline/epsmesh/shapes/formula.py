@@ -132,7 +132,7 @@ def _value(node: ast.expr, named: dict[str, _Value]) -> _Value:
             return _combined(operator, _value(node.left, named), _value(node.right, named))
         case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]) if name in _FUNCTIONS and parts:
             return _called(name, [_value(part, named) for part in parts])
-        case ast.Name(id=name):
+        case ast.Name(id=name) | ast.Call(func=ast.Name(id=name)) if name not in _FUNCTIONS:
             raise FormulaError(
                 f"has the unknown name `{name}`: known are {', '.join(COORDINATES)}, {', '.join(_FUNCTIONS)}; a unit "
                 "follows a number, as in 1 mm"

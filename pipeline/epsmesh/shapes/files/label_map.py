@@ -237,7 +237,7 @@ def check_shape(shape: tuple[int, ...], size: int = 1) -> None:
     if len(shape) < 3 or any(k != 1 for k in shape[3:]):
         sizes = " × ".join(map(str, shape))
         raise SurfaceError(
-            f"has {len(shape)} dimensions, {sizes}: allowed is one label map of 3; export one segment or time"
+            f"has {len(shape)} dimensions, {sizes}: allowed is one image of 3; export one segment or time"
         )
     if min(shape) < 1:
         raise SurfaceError(f"has {' × '.join(map(str, shape))} voxels: export it again")
@@ -259,10 +259,11 @@ def unit_of(named: str | None, given: float | None) -> float:
     """
     if named is None and given is None:
         raise SurfaceError(
-            'its header names no unit of length: give one, such as unit = "mm" in the study or `--unit mm`'
+            'its header names no unit of length: give one, unit = "mm" of a body or length_unit = "mm" of a modulus in '
+            "the study, or `--unit mm`"
         )
     if named is not None and given is not None and not np.isclose(UNITS[named], given):
-        raise SurfaceError(f"its header says {named}, and the study another unit: leave out `unit`")
+        raise SurfaceError(f"its header says {named}, and the study another unit: leave that out")
     return UNITS[named] if named is not None else float(given or 0.0)
 
 
