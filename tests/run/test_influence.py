@@ -59,6 +59,13 @@ def test_bars_hold_the_shares_of_a_finer_mesh(changes):
     assert (np.diff(coarse["influence_radius"]) > 0).all()
 
 
+def test_distances_are_from_the_first_touch():
+    """A ball inclined by 20° touches 1.8 mm beside its axis, and presses by d cos 20° across the surface."""
+    inclined = dataset(probe=BALL | {"axis": [0.342, 0.0, -0.9397]}, mesh={"rim": "0.5 mm"})
+    upright = dataset(probe=BALL | {"depth": "0.47 mm"}, mesh={"rim": "0.5 mm"})
+    assert inclined["influence_radius"].values == pytest.approx(upright["influence_radius"].values, rel=0.08)
+
+
 def test_a_column_in_compression_is_decided_in_proportion_to_its_volume():
     """A disc as wide as a cylinder of ν = 0: the strain is uniform, and the ball that has a share is known."""
     half = 6e-3

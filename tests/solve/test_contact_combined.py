@@ -245,7 +245,7 @@ def test_tilted_disc_touches_first_at_its_edge_and_its_depth_counts_from_there()
 
 
 def test_tilted_ball_is_pressed_by_what_its_depth_is_across_the_surface():
-    """A ball moves along an axis at 6° to the normal: the indentation is d cos 6°; forces are along the axis alone."""
+    """A ball moves along an axis at 6° to the normal: the indentation is d cos 6°."""
     ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm"}
     tilted, upright = record(probe=ball | {"axis": [0.1, 0, -1]}), record(probe=ball)
     assert tilted.force == pytest.approx(upright.force, rel=0.02 + tilted.force_error)

@@ -58,6 +58,7 @@ CASES = {
     "ellipsoid": scene(body=ELLIPSOID, probe={"at": ["0 mm", "0 mm", "20 mm"]}),
     "tilted": scene(probe={"axis": [0.1736, 0.0, -0.9848]}),
     "found": scene(probe=BALL, mesh={"rim": "0.4 mm"}),
+    "found, inclined": scene(probe=BALL | {"axis": [0.2588, 0.0, -0.9659]}, mesh={"rim": "0.4 mm"}),
     "found, degree 3": scene(probe=BALL, mesh={"rim": "0.4 mm", "degree": 3}),
     "found, incompressible": scene(0.5, probe=BALL, mesh={"rim": "0.4 mm"}),
     "found, flat": scene(probe={"contact": "unilateral"}),

@@ -14,10 +14,12 @@ from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.steps import Solve
 from epsmesh.run.spread import deviation_of
+from epsmesh.shapes.contact import place_of_touch
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.points.locate import table_of
 from epsmesh.solve.points.reduce import CHANGES
 from epsmesh.solve.points.state import State
+from epsmesh.study.case import Case
 from epsmesh.study.influence import DECIDED
 
 # Points of a cell at which its influence is summed by distance; cells that are summed together.
@@ -45,7 +47,7 @@ def influence_of(
     count, numbers = len(case.tissues), np.zeros(body.owned_cells, int)
     if body.regions is not None:  # beyond ε, the linear part of each region has a number of its own
         numbers = body.regions[: body.owned_cells] % count
-    centre = np.array(solve.meshed_case.frame.upright.point)
+    centre = _touch(solve.meshed_case)
     above = (finer and finer.influence) or state.influence
     reach = comm.allreduce(_farthest(body, centre), op=MPI.MAX)
     edges = np.concatenate([[0.0], reach * np.geomspace(_LEAST, 1.0, _DISTANCES)])
@@ -81,6 +83,13 @@ def influence_of(
     spreads = [tissue.spread for tissue in case.tissues]
     values |= {"tissue_spread": (deviation_of(state, numbers, spreads),)} if any(spreads) else {}
     return {name: tuple(map(float, numbers)) for name, numbers in values.items()}
+
+
+def _touch(case: Case) -> FloatArray:
+    """Return where the tool touches on the mesh: flat tools in the middle, others where they do first."""
+    frame = case.frame
+    point = np.array(frame.point if case.probe.is_flat else place_of_touch(case.body, case.probe, frame))
+    return point if frame.turn is None else np.asarray(frame.turn @ point)
 
 
 def _farthest(body: BodyMesh, centre: FloatArray) -> float:

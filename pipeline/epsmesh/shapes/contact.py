@@ -228,13 +228,19 @@ def normal_at_touch(body: Body, probe: Probe, frame: Frame) -> Vector:
     Of a surface of triangles it is the mean below a footprint there, as for the tool's place: that of one facet is
     noise.
     """
-    x, y, _ = first_touch(body, probe, frame)
-    inward = frame.normal
-    if (x, y) != (0.0, 0.0):
-        points, _ = body.lift(frame, np.vstack([[[x, y]], outline_points(probe)]))
-        inward = body.frame_below(tuple(map(float, points[0])), None, probe.circumradius).normal
-    a, b, c = inward
+    point = place_of_touch(body, probe, frame)
+    a, b, c = (frame if point == frame.point else body.frame_below(point, None, probe.circumradius)).normal
     return -a, -b, -c
+
+
+def place_of_touch(body: Body, probe: Probe, frame: Frame) -> Vector:
+    """Return the point of the surface (m) that a tool first touches, in the body's coordinates."""
+    x, y, _ = first_touch(body, probe, frame)
+    if (x, y) == (0.0, 0.0):
+        return frame.point
+    points, _ = body.lift(frame, np.vstack([[[x, y]], outline_points(probe)]))
+    x, y, z = map(float, points[0])
+    return x, y, z
 
 
 def _least_gap(body: Body, probe: Probe, frame: Frame, points: FloatArray) -> tuple[FloatArray, float]:

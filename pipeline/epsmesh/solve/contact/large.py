@@ -268,9 +268,9 @@ class LargeContactSolution:
 
     def _show_rate(self) -> None:
         body, state, active, found = self.body, self.body.state, self.touched.active, list[FloatArray]()
-        for share in (1 + _NEARBY, 1 - _NEARBY):
+        for change in (_NEARBY * self.depth, -_NEARBY * self.depth):
             body.state = state
-            tool = placed_tool(body, self.placed, share * self.depth)
+            tool = placed_tool(body, self.placed.advanced(change), self.depth)
             solve_contact(body, replace(tool, complete=lambda _: active), active)
             found.append(body.state)
         body.state = (found[0] - found[1]) / (2 * _NEARBY * self.depth)

@@ -69,6 +69,21 @@ class Tool:
         """Return how far (n, m) the tool, at a ``depth`` (m), is from ``places`` (n, 3) along a unit ``normal``."""
         return heights_along(normal, lambda points: self.distance(points, depth), places)
 
+    def advanced(self, change: float) -> "Tool":
+        """Return the tool farther along its axis by ``change`` (m), as forces of contact do work.
+
+        Those along the ``normal`` are not across the tool's surface beside the first touch: their work is that of a
+        tool that comes nearer along the normal.
+        """
+
+        def distance(points: FloatArray, depth: float) -> Distance:
+            if self.normal is None:
+                return self.distance(points, depth + change)
+            found = self.distance(points, depth)
+            return replace(found, gap=found.gap - change * self.normal[2])
+
+        return replace(self, distance=distance)
+
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.
 
