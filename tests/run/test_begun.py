@@ -36,6 +36,20 @@ StepRunner._solve = fatal
 from epsmesh.__main__ import main
 main()
 """
+# The command, which ends in the path with friction to the second of two depths, on its finer load steps.
+ON_THE_PATH = """
+import os
+from epsmesh.solve.contact import large
+reach, begun = large.reach_contact_with_friction, []
+def fatal(*given):
+    begun.append(given)
+    if len(begun) == 4:
+        os.abort()
+    return reach(*given)
+large.reach_contact_with_friction = fatal
+from epsmesh.__main__ import main
+main()
+"""
 # Ends the process once another has finished all other cases.
 WAIT = """
         import time
@@ -252,6 +266,37 @@ def test_a_case_that_ends_its_process_twice_fails_in_the_next_run_alone(epsmesh,
     assert np.isfinite(data["force"].values).tolist() == [False, True, True]
     again = epsmesh(*words)
     assert (again.exit_code, "3 ok" in again.stdout) == (0, True), again.stderr
+
+
+def test_a_run_that_is_killed_on_a_path_with_friction_is_taken_up_with_the_forces_of_one_that_was_not(
+    epsmesh, tmp_path: Path
+):
+    """A path has a memory, and begins again from the first touch; the depth before is not solved again."""
+    file = tmp_path / "path.toml"
+    probe = {"shape": "sphere", "radius": "4 mm", "depth": ["0.3 mm", "0.6 mm"], "contact": "unilateral"}
+    changes = {
+        "probe": probe | {"friction": 0.2},
+        "material": {"law": "neo-hookean"},
+        "mesh": {"epsilon": "full", "rim": "0.8 mm"},
+        "plan": {"without": ["axisymmetric"]},
+    }
+    file.write_text(small_text(**changes))
+    words, forces = ("run", file, "--meshes", tmp_path / "meshes", "--output"), []
+    killed = run(ON_THE_PATH, *words, tmp_path / "killed")
+    assert killed.returncode not in (0, 1, 2), killed.stderr
+    stored = Store(tmp_path / "killed" / "cases.sqlite")
+    store_done(stored)
+    assert [record.status for record in stored.records()] == ["ok"]  # the depth before
+    stored.close()
+    for name in ("killed", "whole"):
+        ended = epsmesh(*words, tmp_path / name)
+        assert ended.exit_code == 0, ended.stderr
+        data = read_file(tmp_path / name / "path.nc").squeeze()
+        forces.append(data["force"].values)
+        assert list(data["status"].values) == ["ok", "ok"]
+        assert (data["slip_area"].values > 0).all()
+    assert forces[0][0] < forces[0][1]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-5)
 
 
 def test_a_rank_that_fails_alone_ends_the_run_and_the_next_one_knows_why(epsmesh, tmp_path: Path):

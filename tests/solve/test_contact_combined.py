@@ -67,6 +67,20 @@ def test_loads_on_a_quarter_a_half_and_the_whole_agree():
     assert quarter.sag == pytest.approx(whole.sag, rel=1e-6)
 
 
+def test_loads_that_move_the_tissue_below_the_probe_are_told():
+    """The top of the box moves by ρ g H² / 2 G in shear, 1.8 mm, and bends; a linear law presses it where it was."""
+    load = {"gravity": ["9.81 m/s^2", "0 m/s^2", "0 m/s^2"]}
+    soft, stiff = (
+        record(material=TISSUE | {"young": young}, load=load, mesh={"rim": "0.6 mm", "fine": "5 mm"}).message
+        for young in ("3 kPa", "300 kPa")
+    )
+    words = soft.removeprefix("loads move the tissue below the probe by ").split()
+    assert 1.8 < float(words[0]) < 2.7
+    assert words[1:5:2] == ["mm,", "contact"]
+    assert 2 < float(words[2]) < 2.7  # the radius is next to 1 mm, that of 10 mm pressed by 0.1 mm
+    assert stiff == ""
+
+
 def test_friction_begins_at_none_where_loads_move_a_sloping_surface_across_the_axis():
     """The gaps of a linear law are above undeformed places with and without friction, and so is the first touch."""
     ball = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "at": ["9 mm", "0 mm"]}

@@ -219,7 +219,7 @@ class StepRunner:
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
         record, notes = with_fields(solve, problem, meshed.spaces, record, has_bar=has_bar)
-        missing = "; ".join(filter(None, (missing, notes)))
+        missing = "; ".join(filter(None, (missing, notes, solution.contact.note if solution.contact else "")))
         stamped = self._stamp(record, meshed.memory)
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 

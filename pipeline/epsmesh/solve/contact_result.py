@@ -4,10 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan, pi
 
+from epsmesh.shapes.section import in_mm
+
 # Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
 # the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
 # contact area, and a part of what nodal forces have beyond it. Measured: benchmarks/results/friction.md.
 _OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, _OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.3
+
+# Contact radii by which loads may move the place of contact without a word.
+_MOVED = 0.5
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,8 @@ class ContactResult:
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
     tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
-    size of elements there.
+    size of elements there. ``shift`` (m) is how far loads move the place of contact across the axis, NaN where the tool
+    follows.
     """
 
     area: float
@@ -38,11 +44,21 @@ class ContactResult:
     load_energy: float = nan
     is_ended: bool = False
     at_edge: float = 0.0
+    shift: float = nan
 
     @property
     def radius(self) -> float:
         """Radius (m) of a disc of the same area."""
         return float(self.area / pi) ** 0.5
+
+    @property
+    def note(self) -> str:
+        """What no bar of the force tells, "" if nothing."""
+        if not self.shift >= _MOVED * self.radius:
+            return ""
+        by = f"{in_mm(self.shift)}, {self.shift / self.radius:.2g} contact radii"
+        remedy = 'law = "neo-hookean" presses what they bring there'
+        return f"loads move the tissue below the probe by {by}, which a linear law leaves in its place: {remedy}"
 
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.

@@ -120,9 +120,17 @@ class LinearContact:
             add_far(column, self.far, self.far_share)
 
     def summary(self, sag: float) -> ContactResult:
-        """Return the whole contact; ``sag`` (m) is that of the first touch."""
-        energy = nan if self.loaded is None else 2.0 ** len(self._plug.body.mirrored) * self.loaded.energy / 2
-        return self.surface.result(sag, energy)
+        """Return the whole contact; ``sag`` (m) is that of the first touch; collective."""
+        if self.loaded is None:
+            return self.surface.result(sag, nan)
+        energy = 2.0 ** len(self._plug.body.mirrored) * self.loaded.energy / 2
+        return self.surface.result(sag, energy, self._shift(self.loaded))
+
+    def _shift(self, loaded: FreeResponse) -> float:
+        """Return how far (m) loads move the nodes in contact across the axis, in the mean of the whole body."""
+        weights = np.where(self.surface.touched.active, self.obstacle.candidates.weights, 0.0)
+        moved = weights @ self.sweep.elements.numbering.gather_vectors(loaded.unknowns[0]) / weights.sum()
+        return float(np.linalg.norm([moved[axis] for axis in (0, 1) if axis not in self._plug.body.mirrored]))
 
     def response(self, column: Column, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d; its balance is the largest of all checks."""

@@ -47,9 +47,10 @@ class FrictionIteration:
 
     def __init__(self, friction_step: FrictionStep):
         self._with, self.slide, self.normal = friction_step, friction_step.slide, friction_step.normal
+        self._wanted = self.slide  # by the law, undamped
         self._simple = Simplified.none(len(friction_step.normal))
         self.is_linear = friction_step.is_linear
-        self._damping = Damping(_SWINGING_LINEAR if self.is_linear else _SWINGING, swings=self.is_linear)
+        self._damping = Damping(_SWINGING_LINEAR if self.is_linear else _SWINGING)
         self._seen, self._single = set[bytes](), False
         self.is_same = False
 
@@ -70,7 +71,8 @@ class FrictionIteration:
             self._seen.add(state)
         self._simple = self._simple.counting(moves, turns) if self._single else self._simple
         self.is_same = not turns.any()
-        self.slide = self._damping.towards(self.slide, self._simple.steady(self.slide, after), iteration)
+        self._wanted = self._simple.steady(self.slide, after)
+        self.slide = self._damping.towards(self.slide, self._wanted, iteration)
 
     def is_sound(self, active: BoolArray) -> bool:
         """Return whether nodes whose state was simplified carry little of the force, or friction no part of it."""
@@ -81,8 +83,8 @@ class FrictionIteration:
         share = float(pressed[simple].sum()) / float(pressed[active].sum())
         return share <= self._with.simplified or self._with.friction * share <= _NO_PART
 
-    def friction(self, place: "Placed") -> FloatArray:
-        """Return the friction (n, d) N on nodes that slide, zero on others.
+    def _friction(self, place: "Placed", slide: Slide) -> FloatArray:
+        """Return the friction (n, d) N on nodes that ``slide``, zero on others.
 
         At corners, whose normal reactions may have any sign, it has that of the reaction: the sum then obeys the law.
         """
@@ -90,18 +92,16 @@ class FrictionIteration:
         most = largest_friction(law, self.normal)
         if self._with.friction < np.inf:
             most = np.where(self._with.neighbours.is_corner, law * self.normal, most)
-        most = np.where(self.slide.sliding & (most < np.inf), most, 0.0)
-        return np.where(self._with.fixed, 0.0, most[:, None] * self._within(place).directions)
-
-    def _within(self, place: "Placed") -> Slide:
-        """Return the state with trial tractions along the tool's surface."""
-        within = self.slide.trial - np.einsum("ni,ni->n", self.slide.trial, place.normal)[:, None] * place.normal
-        return replace(self.slide, trial=within)
+        most = np.where(slide.sliding & (most < np.inf), most, 0.0)
+        return np.where(self._with.fixed, 0.0, most[:, None] * _within(place, slide).directions)
 
     def exerted(self, place: "Placed", forces: FloatArray, active: BoolArray) -> FloatArray:
-        """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need."""
+        """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need.
+
+        That of others is what the law wants: damped, it would be near the forces wherever it hardly changes.
+        """
         across = forces - np.einsum("ni,ni->n", forces, place.normal)[:, None] * place.normal
-        return np.where(self.sticks(active)[:, None], across, self.friction(place))
+        return np.where(self.sticks(active)[:, None], across, self._friction(place, self._wanted))
 
     def constrain(self, constraint: Constraint, place: "Placed", active: BoolArray) -> Constraint:
         """Return a ``constraint`` with the tangents of sticking nodes held, and the friction on sliding ones."""
@@ -111,12 +111,12 @@ class FrictionIteration:
         held[sticks, :-1] = True
         values[sticks, :-1] = along[sticks, :-1]
         sliding = self._sliding(place, active & ~sticks)
-        return replace(constraint, held=held, values=values, forces=self.friction(place), sliding=sliding)
+        return replace(constraint, held=held, values=values, forces=self._friction(place, self.slide), sliding=sliding)
 
     def _sliding(self, place: "Placed", nodes: BoolArray) -> Sliding:
         """Return the friction of ``nodes`` (n) that slide, linearised: that of corners and of simplified nodes is not
         turned by their own tractions."""
-        law, slide = np.where(nodes, self._simple.law(self._with.friction), 0.0), self._within(place)
+        law, slide = np.where(nodes, self._simple.law(self._with.friction), 0.0), _within(place, self.slide)
         is_given = self._with.neighbours.is_corner | self._simple.nodes
         most = np.where(is_given, 0.0, largest_friction(law, self.normal))
         penalty, slips = self._with.penalty, self.slips(place)
@@ -142,6 +142,12 @@ class Placed:
         """Return the vectors (n, d) from ``references`` (n, d), along the tool's surface."""
         moved = self.positions - references
         return np.asarray(moved - np.einsum("ni,ni->n", moved, self.normal)[:, None] * self.normal)
+
+
+def _within(place: Placed, slide: Slide) -> Slide:
+    """Return a state with its trial tractions along the tool's surface."""
+    within = slide.trial - np.einsum("ni,ni->n", slide.trial, place.normal)[:, None] * place.normal
+    return replace(slide, trial=within)
 
 
 def meeting_places(

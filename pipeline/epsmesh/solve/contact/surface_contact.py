@@ -5,6 +5,7 @@ Force, area, slip, friction and torque follow from the nodes alone, whatever the
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import nan
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.checks import force_of
@@ -52,9 +53,10 @@ class SurfaceContact:
         """The contact area (m²) of the whole body, normal to the axis."""
         return float(2.0 ** len(self.mirrored) * self.area.value)
 
-    def result(self, sag: float, load_energy: float) -> ContactResult:
-        """Return the whole contact; ``sag`` (m) and ``load_energy`` (J) of the whole body are the effects of loads."""
-        found = ContactResult(self.whole_area, sag=sag, load_energy=load_energy, is_ended=self.is_ended)
+    def result(self, sag: float, load_energy: float, shift: float = nan) -> ContactResult:
+        """Return the whole contact; ``sag`` (m), ``load_energy`` (J) of the whole body and ``shift`` (m) are the
+        effects of loads."""
+        found = ContactResult(self.whole_area, sag=sag, load_energy=load_energy, is_ended=self.is_ended, shift=shift)
         if self.coarse is None:
             return found
         rubbing = rubbing_of(self.candidates, self.tool.friction, self.touched, self.coarse)
