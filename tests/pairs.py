@@ -166,6 +166,10 @@ def _poisson(value: float) -> Callable[[Study], None]:
     return change
 
 
+def _capsule(study: Study) -> None:
+    study["body"]["capsule"] = {"young": "1 MPa", "thickness": "0.1 mm", "poisson": 0.4}
+
+
 def _traction(study: Study) -> None:
     study.setdefault("load", {})["traction"] = [{"on": "free", "pressure": "0.2 kPa"}]
 
@@ -243,6 +247,7 @@ FEATURES = (
     Feature("inclusion", "inclusion", _inclusion),
     Feature("region", "region", _region),
     Feature("hollow region", "region", _hollow),
+    Feature("capsule", "capsule", _capsule),
     Feature("nu .49", "poisson", _poisson(0.49)),
     Feature("nu .5", "poisson", _poisson(0.5)),
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),

@@ -224,6 +224,7 @@ Force = Annotated[float, _quantity_in("N"), Field(gt=0, json_schema_extra={"unit
 Density = Annotated[float, _quantity_in("kg/m^3"), Field(gt=0, json_schema_extra={"unit": "kg/m^3"})]
 Toughness = Annotated[float, _quantity_in("J/m^2"), Field(gt=0, json_schema_extra={"unit": "J/m^2"})]
 Stiffness = Annotated[float, _quantity_in("N/m"), Field(gt=0, json_schema_extra={"unit": "N/m"})]
+Tension = Annotated[float, _quantity_in("N/m"), Field(ge=0, json_schema_extra={"unit": "N/m"})]
 Foundation = Annotated[float, _quantity_in("N/m^3"), Field(gt=0, json_schema_extra={"unit": "N/m^3"})]
 Acceleration = Annotated[float, _quantity_in("m/s^2"), Field(json_schema_extra={"unit": "m/s^2"})]
 Duration = Annotated[float, _quantity_in("s"), Field(ge=0, json_schema_extra={"unit": "s"})]

@@ -26,6 +26,8 @@ PHYSICS_VERSION = 14
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
+# Keys of a body that its mesh does not depend on.
+_NOT_MESHED = ("capsule",)
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/epsmesh/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -72,6 +74,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
         _ratios_text(case.probe) if scaled else "",
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
+    tail += [f"capsule {text_of(case.body.capsule)}"] if case.body.capsule else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
 
@@ -129,7 +132,7 @@ def operator_key(case: Case) -> str:
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
-    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.load.terms), *fields])
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *fields])
 
 
 def normalised(case: Case) -> Case:
@@ -179,8 +182,8 @@ def _in_units_of(stress: float, body: Body) -> Body:
 def _body_text(body: Body, stress: float | None = None) -> str:
     """Return a body in canonical form, moduli in units of ``stress`` (Pa); without it, only the geometry."""
     if not body.pieces:
-        return text_of(body)
-    content = body.model_dump()
+        return text_of(body, _NOT_MESHED)
+    content = body.model_dump(exclude={*_NOT_MESHED})
     ends = (*body.interfaces, body.heights[0])
     for number, layer in enumerate(content.get("layer", ())):
         layer["thickness"] = ends[number]  # its lower end, so that equal layers have equal texts

@@ -37,7 +37,7 @@ def slides_across(case: Case) -> bool:
 
 def model_planes(case: Case) -> tuple[str, ...]:
     """Return the planes of symmetry of geometry, movement, loads and tissue: half or a quarter of the body does."""
-    tests = [case.load.is_mirrored, *(tissue.is_mirrored for tissue in case.tissues)]
+    tests = [case.load.is_mirrored, case.body.is_capsule_mirrored, *(tissue.is_mirrored for tissue in case.tissues)]
     return tuple(plane for plane in movement_planes(case) if all(test(PLANES[plane]) for test in tests))
 
 

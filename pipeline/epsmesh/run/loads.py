@@ -33,14 +33,14 @@ def loads_of(case: Case) -> Loads | None:
 
 
 def terms_of(case: Case) -> tuple[AddedTerm, ...]:
-    """Return the terms of the energy that [load] adds."""
+    """Return the terms of the energy besides the law's."""
     turn = case.frame.turn
 
     def of(term: BodyTerm) -> AddedTerm:
         key = term, None if turn is None else turn.tobytes()  # spaces are those of one mesh, hence of one body
         return EnergyTerm(term.energy, key, *_part(case, term.on), turn)
 
-    return tuple(map(of, case.load.terms))
+    return tuple(map(of, case.terms))
 
 
 def _surface_load(case: Case, traction: Traction) -> SurfaceLoad:

@@ -7,9 +7,11 @@ from math import inf
 from typing import Annotated, Any, ClassVar, Self, cast
 
 from epsmesh.arrays import FloatArray
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.frame import Frame, Units, Vector
 from epsmesh.shapes.half_plane import HalfPlane
+from epsmesh.shapes.part import is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Region
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
@@ -52,6 +54,16 @@ class Body(Section, ABC):
         tuple[Segment, ...],
         Words("Regions of any shape, of another material, inside the body.", "[[body.region]]"),
     ] = ()
+
+    # Not of its shape: meshes do not depend on it.
+    capsule: Annotated[
+        Capsule | None,
+        Words("Capsule: a membrane on the body's surface.", "[body.capsule]", default="none"),
+    ] = None
+
+    def is_capsule_mirrored(self, normal: Vector) -> bool:
+        """Tell whether the capsule, if any, is its own image in a plane with that unit normal, as the shape is."""
+        return self.capsule is None or is_part_mirrored(self.capsule.on, normal)
 
     @property
     def pieces(self) -> dict[str, tuple[Region, ...]]:

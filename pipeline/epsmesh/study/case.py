@@ -10,9 +10,10 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import curvature_below, is_level
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.term import BodyTerm
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
-from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps, touches_inclined
+from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps, terms_of, touches_inclined
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.closure import FarRegion
 from epsmesh.study.loads import Load
@@ -80,6 +81,11 @@ class Case:
     far_region: FarRegion | None = None
     outputs: tuple[Output, ...] = ()
     shared: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    @property
+    def terms(self) -> tuple[BodyTerm, ...]:
+        """What else has an energy: terms of [load], and the body's capsule."""
+        return terms_of(self)
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:
@@ -294,7 +300,7 @@ class Case:
             needs_time_steps(self),
             Dimension.SECTION if probe.crack else Dimension.BODY,
             is_loaded=is_loaded(self),
-            has_terms=bool(self.load.terms),
+            has_terms=bool(self.terms),
             is_inclined=touches_inclined(self),
             motion=self._motion,
         )

@@ -32,6 +32,10 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for axis in axes:
         if axis.section == "load" and axis.piece and not axis.owner:
             problems.error(axis.path, None, "is swept: give its table a `name`")
+    for body in bodies:
+        if body.capsule:
+            with problems.about(body=body):
+                _check_place(body, body.capsule.on, "body.capsule.on", problems)
     for body, load in product(bodies, loads):
         if body.fixed == NONE and not any(term.HOLDS for term in load.terms):
             with problems.about(body=body):

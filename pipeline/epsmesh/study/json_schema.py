@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from epsmesh import extensions
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.history import History, Sine
 from epsmesh.shapes.section import Section, words_of
 from epsmesh.shapes.varying import Varying
@@ -87,7 +88,7 @@ def study_schema() -> Schema:
         properties = definition.get("properties", {})
         for key, value in properties.items():
             in_file = _in_file(value, name in swept, key)
-            if key in PLAIN_TOO:
+            if key in PLAIN_TOO and name != Capsule.__name__:
                 table = {"$ref": f"#/$defs/{Varying.__name__}"}
                 some = {"type": "array", "minItems": 1, "items": {"anyOf": [{"type": "string"}, table]}}
                 in_file = {"anyOf": [in_file, table, some]}

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from epsmesh import extensions
 from epsmesh.shapes.body import Body
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.history import History
 from epsmesh.shapes.insertion import Insertion
 from epsmesh.shapes.regions import Inclusion, Layer
@@ -340,6 +341,7 @@ NESTED: dict[str, dict[str, type[Section]]] = {
 SINGLE = ("solve", "plan", "figure")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
+    "body": {"capsule": Capsule},
     "probe": {"path": Path, "history": History, "insertion": Insertion},
     "material": {"fibres": Fibres, "spread": Spread, "young": Varying},
 }

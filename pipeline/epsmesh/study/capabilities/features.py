@@ -16,6 +16,7 @@ from epsmesh.shapes.insertion import Inserted
 from epsmesh.shapes.probe import STICK, Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import in_mm
+from epsmesh.shapes.term import BodyTerm
 from epsmesh.study.loads import Load
 from epsmesh.study.schema import Material, Mesh
 from epsmesh.viscoelastic import Terms
@@ -137,9 +138,18 @@ def is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
 
+def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
+    """Return the terms of the energy besides the law's: those of [load], and the body's capsule."""
+    return (*scene.load.terms, *filter(None, [scene.body.capsule]))
+
+
+def _has_tension(scene: Scene) -> bool:
+    return scene.body.capsule is not None and scene.body.capsule.tension > 0
+
+
 def _moves_surface(scene: Scene) -> bool:
     """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
-    return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(scene.load.terms))
+    return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(terms_of(scene)))
 
 
 def _has_term(scene: Scene, name: str) -> bool:
@@ -161,7 +171,7 @@ def needs_time_steps(scene: Scene) -> bool:
     if scene.probe.history is None:
         return False
     is_followed = scene.probe.friction > 0 or (scene.probe.is_unilateral and is_loaded(scene))
-    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(scene.load.terms) or is_followed
+    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(terms_of(scene)) or is_followed
 
 
 def _is_off_axis(scene: Scene) -> bool:
@@ -245,7 +255,9 @@ FEATURES: dict[str, Feature] = {
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
     "loads": Feature("load", is_loaded, ("body",)),
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
-    "terms": Feature("load", lambda s: bool(s.load.terms)),
+    "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
+    "capsule": Feature("body.capsule", lambda s: s.body.capsule is not None, write=lambda _: None),
+    "tension of the capsule": Feature("body.capsule", _has_tension, write=lambda _: None),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),

@@ -98,7 +98,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "varying stiffness": "material.young: a scene of SOFA has one modulus for each region",
         "relaxation": "material.relaxation: a scene of SOFA is static",
         "loads": "[load]: a scene of SOFA has the tool's force alone",
-        "terms": "[load]: a scene of SOFA has the tool's force alone",
+        "terms": "[load], body.capsule: a scene of SOFA has the tool's force and the tissue alone",
         "half ball": 'mesh.epsilon: the far field of a half ball has no counterpart in SOFA: use epsilon = "full"',
         "six motions": "probe.motion: a scene of SOFA has one motion",
         "slit": "probe.incision: a scene of SOFA has no slit",
@@ -109,7 +109,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
-        "terms": "[load]: springs and other terms have no real-time model",
+        "terms": "[load], body.capsule: springs, capsules and other terms have no real-time model",
         "fibres": "material.law: fibres have a direction, and the half-space of a real-time model has none",
         "varying stiffness": "material.young: the half-space of a real-time model has one modulus. Give a value",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "

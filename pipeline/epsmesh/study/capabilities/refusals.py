@@ -8,9 +8,11 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from epsmesh.shapes.body import Body
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
+from epsmesh.shapes.term import BodyTerm
 from epsmesh.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
 from epsmesh.study.problems import Problems
 from epsmesh.study.schema import Material
@@ -36,7 +38,8 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
-_WITH_TERMS, _NO_TERMS = "with springs or other terms in [load]", "omit them"
+_WITH_TERMS, _NO_TERMS = "with springs or other terms in [load], or a capsule", "omit them"
+_TERMS: dict[str, type[BodyTerm]] = {**TERMS, "capsule": Capsule}
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
 # Where derivatives of F by the modulus at a place are not those of an energy, or not computed.
@@ -232,10 +235,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("slit", "terms", f"a slit {_WITH_TERMS} is not computed: {_NO_TERMS}"),
     Refusal("slice", "terms", f"must be 0 mm {_WITH_TERMS}: the blade only presses"),
     Refusal("insertion", "terms", f"cuts in tissue {_WITH_TERMS} are not computed: {_NO_TERMS}"),
-    Refusal("half ball", "terms", f"the far field has none of [load]: {_COARSE}"),
+    Refusal("half ball", "terms", f"the far field has neither those of [load] nor a capsule: {_COARSE}"),
     Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
     Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
-    *(Refusal(name, other, reason) for name, kind in TERMS.items() for other, reason in kind.EXCLUDES.items()),
+    *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
+    Refusal("influence", "tension of the capsule", "the tension decides where the depth begins: omit one of the two"),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 
