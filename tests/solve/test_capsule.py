@@ -28,8 +28,8 @@ def skin(**keys):
 def stored(case, displacement):
     """Return the energy (J) of a case's capsule at a displacement, a function of the undeformed place."""
     (term,) = terms_of(case)
-    with Spaces(mesh_case(case, (), MPI.COMM_SELF, None)) as spaces:
-        space = spaces.of(2, Conditions(terms=(term,)))
+    with Spaces(mesh_case(case, (), MPI.COMM_SELF)) as spaces:
+        space = spaces.get(2, Conditions(terms=(term,)))
         u = space.forms.displacement
         u.interpolate(displacement)
         return space.terms[0].energy()
@@ -44,11 +44,10 @@ def test_a_ball_that_swells_has_the_energy_of_a_pressurised_sphere():
     assert stored(case, lambda x: strain * x) == pytest.approx(energy * (1 - 0.1 / 40), rel=0.01)
 
 
-@pytest.mark.parametrize("law", ["linear"])
-def test_a_stretched_membrane_under_a_disc(law):
+def test_a_stretched_membrane_under_a_disc():
     """F = 2π T d / ln(R/a), on tissue without stiffness."""
     body = CYLINDER | {"capsule": SKIN | {"young": "1 mPa", "tension": "3 N/m"}}
-    soft = {"young": "0.1 Pa", "poisson": 0.3, "law": law}
+    soft = {"young": "0.1 Pa", "poisson": 0.3}
     found = solved(body=body, material=soft, mesh={"fine": "4 mm", "rim": "0.5 mm"})
     known = 2 * pi * 3 * 0.2e-3 / log(30 / 3)
     assert found.force == pytest.approx(known, rel=2e-3)
@@ -74,10 +73,17 @@ def test_it_is_the_limit_of_a_thin_layer():
     assert found.force > without * 1.03
 
 
-@pytest.mark.parametrize("tool", [{}, BALL], ids=["bonded", "found"])
-def test_a_quarter_is_the_whole(tool):
-    quarter, whole = (force(probe=tool, **skin(), mesh={"model": model}) for model in ("auto", "3d"))
-    assert whole == pytest.approx(quarter, rel=0.01)
+@pytest.mark.parametrize(
+    ("tool", "element"),
+    [({}, "displacement"), (BALL, "displacement"), ({}, "mixed"), (BALL, "mixed")],
+    ids=["bonded", "found", "bonded, mixed", "found, mixed"],
+)
+def test_a_quarter_is_the_whole(tool, element):
+    quarter, whole = (
+        solved(probe=tool, **skin(), mesh={"model": model, "element": element}) for model in ("auto", "3d")
+    )
+    assert abs(whole.force / quarter.force - 1) < whole.force_error + quarter.force_error
+    assert whole.force == pytest.approx(quarter.force, rel=0.02)
 
 
 def test_work_is_twice_the_energy_of_tissue_and_capsule():
@@ -91,7 +97,7 @@ def test_work_is_twice_the_energy_of_tissue_and_capsule():
 def test_force_grows_with_it_and_vanishes_with_it():
     none, soft, stiff = (force(**changes) for changes in ({}, skin(young="1 Pa"), skin(young="10 MPa")))
     assert soft == pytest.approx(none, rel=1e-4)
-    assert stiff > 1.05 * none
+    assert stiff > 1.03 * none
 
 
 def test_tissue_and_capsule_scale_together_and_not_tissue_alone():
