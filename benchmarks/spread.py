@@ -90,7 +90,8 @@ class Scene:
     def force(self, cells: FloatArray | None = None, *, influence: bool = False) -> tuple[float, State]:
         """Return the force, and the fields."""
         found = problems.variation_of
-        problems.variation_of = lambda case: None if cells is None else Cells(cells)  # type: ignore[assignment]
+        given: Any = None if cells is None else Cells(cells)
+        problems.variation_of = lambda case: given
         try:
             with Spaces(self.mesh) as spaces, problems.problem_of(spaces, self.case) as problem:
                 asked = Request(problems.law_of(self.case), problems.movement_of(self.case), tolerance=1e-6)
@@ -149,7 +150,7 @@ def rows_of(name: str, samples: int) -> Iterator[dict[str, Any]]:
             mean = np.array([spreads[number].deviation ** 2 / 2 for number in whole.regions])
             cells = (np.exp(values - mean[:, None]) * relative).sum(axis=1)
             logarithms.append(np.log(whole.force(cells)[0] / force))
-        found = deviation_of(of_part, part.regions, spreads)
+        found = deviation_of(of_part, np.asarray(part.regions, dtype=np.int64), spreads)
         ln, first = np.array(logarithms), np.array(firsts)
         truth, bar = known**0.5 * ln.std() / first.std(), 1.96 * _doubt(ln, first)
         rising = np.exp(first - known / 2) - 1

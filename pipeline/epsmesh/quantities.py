@@ -77,13 +77,14 @@ _READ = {
 
 def quantity_of(name: str) -> Quantity | None:
     """Return the quantity of that name, those of layers and inclusions, too; None if there is none."""
-    owner, _, key = name.rpartition("_")
-    if name in QUANTITIES or not owner:
-        return QUANTITIES.get(name)
-    found = next((quantity for quantity in _OF_PIECES if quantity.name == key), None)
-    if found is None:
+    if name in QUANTITIES:
+        return QUANTITIES[name]
+    ends = [quantity for quantity in _OF_PIECES if name.endswith(f"_{quantity.name}")]
+    if not ends:
         return None
-    symbol, axis = (f"{text} of {owner}" if text else "" for text in (found.symbol or key, found.axis))
+    found = max(ends, key=lambda quantity: len(quantity.name))
+    owner = name.removesuffix(f"_{found.name}")
+    symbol, axis = (f"{text} of {owner}" if text else "" for text in (found.symbol or found.name, found.axis))
     return replace(found, name=name, meaning=f"{found.meaning} of {owner}", symbol=symbol, axis=axis)
 
 

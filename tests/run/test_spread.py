@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from epsmesh.arrays import FloatArray
 from epsmesh.plan.plan import make_plan
+from epsmesh.quantities import quantity_of
 from epsmesh.report.dataset import build
 from epsmesh.report.influence import OF_NORMAL
 from epsmesh.report.uncertainty import unknowns
@@ -97,6 +98,16 @@ def test_the_bar_is_half_of_what_holds_95_per_cent_and_the_report_says_what_to_m
     assert "by the spread of the tissue" in said
     assert "The largest bar is that of the tissue's spread: measure next" in said
     assert "spread" not in unknowns(dataset())
+
+
+def test_sweeps_of_a_spread_have_dimensions_of_their_own():
+    skin = SKIN | {"spread": {"young": ["5 %", "10 %"], "correlation_length": "4 mm"}}
+    swept = {"young": ["10 %", "20 %"], "correlation_length": {"from": "2 mm", "to": "4 mm", "steps": 2}}
+    found = parse(raw(body={"layer": [skin]}, material={"spread": swept}))
+    names = ["skin_spread_young", "spread_young", "spread_correlation_length"]
+    assert [axis.name for axis in found.axes] == names
+    assert [quantity_of(name).unit for name in names] == ["1", "1", "m"]
+    assert len({*make_plan(found).keys}) == 8
 
 
 def test_the_force_does_not_depend_on_the_spread():

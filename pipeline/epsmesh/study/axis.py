@@ -6,6 +6,8 @@ from epsmesh.quantities import write
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis", "force")
+# Tables with keys that have the names of others.
+_LIKE_OTHERS = ("spread",)
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,16 @@ class Axis:
         """Name of the dimension in the dataset."""
         if not self.key:
             return self.section
-        if self.owner:
-            return f"{self.owner}_{self.key}"
+        if own := "_".join(filter(None, (self.owner, self._table))):
+            return f"{own}_{self.key}"
         is_ambiguous = self.key in _AMBIGUOUS or (self.section, self.key) == ("body", "axes")
         return f"{self.section}_{self.key}" if is_ambiguous else self.key
+
+    @property
+    def _table(self) -> str:
+        """The table that it is in, if its keys have the names of others."""
+        table = self.piece.rpartition(".")[2]
+        return table if table in _LIKE_OTHERS else ""
 
     @property
     def path(self) -> str:
