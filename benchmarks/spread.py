@@ -173,13 +173,13 @@ def main() -> None:
     """Sample, print and write."""
     parser = options(__doc__)
     parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
-    parser.add_argument("--samples", type=int, default=200)
+    parser.add_argument("--samples", type=int, default=40)
     asked = parser.parse_args()
     table = Table(COLUMNS)
     for name in asked.scenes:
         for row in rows_of(name, asked.samples):
             table.add(row)
-    table.write("spread", asked.output)
+        table.write("spread", asked.output)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ IMAGE = "force_image_uncertainty"
 _NEXT = {
     "force_error": "the mesh: refine it before measuring more",
     NAME: "the tissue's parameters: measure its mean stiffness next",
-    SPREAD: "the tissue's spread: measure next how stiff it is where F is decided (influence_radius), such as by elastography",
+    SPREAD: "the tissue's spread: measure next how stiff it is where F is decided (influence_radius)",
     IMAGE: "the image: find the boundary better next",
 }
 ForceOf = Callable[[Plan], xr.DataArray]
