@@ -112,6 +112,17 @@ def test_mesh_alone_has_no_force_and_no_displacement():
     assert [c["name"] for c in json.loads(element(text, "inputs"))["colours"]] == ["region", "element size"]
 
 
+def test_a_stiffness_that_varies_has_a_scale():
+    made = study(material={"young": {"formula": "8 kPa * (1 - z/(20 mm))"}})
+    (case,) = made.cases()
+    found = compute_fields(solve_alone(made, case), MPI.COMM_SELF, mesh_only=True)
+    np.testing.assert_allclose(found.young, 8e3 * (1 - found.centres[:, 2] / 20e-3), rtol=1e-9)
+    colours = {c["name"]: c for c in json.loads(element(render(found, "mesh"), "inputs"))["colours"]}
+    low, high = colours["Young's modulus"]["limits"]
+    assert (low, high) == pytest.approx((found.young.min() / 1e3, found.young.max() / 1e3))
+    assert len(mesh_arrays(found)["young"]) == len(found.cells)
+
+
 def test_a_triangle_that_bounds_nothing_is_refused(fields):
     facets = fields.facets | {"more": fields.cells[[[0, 0, -1]], [[0, 1, 0]]]}
     with pytest.raises(ValueError, match="1 triangles"):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.run.functions import loaded
 from epsmesh.shapes.varying import Varying
 from epsmesh.solve import SolveError
@@ -54,6 +54,17 @@ class TissueField:
                 f"{len(points)} points: it must return a modulus in Pa for each"
             )
         return found
+
+
+def moduli_of(case: Case, points: FloatArray, regions: IntArray | None) -> FloatArray:
+    """Return the moduli (Pa) at ``points`` (n, 3), m, of the body, in the ``regions`` with those numbers."""
+    numbers = np.zeros(len(points), int) if regions is None else regions % len(case.tissues)
+    found = np.array([tissue.young for tissue in case.tissues])[numbers]
+    variation = variation_of(case)
+    for number, field in enumerate(variation.fields if variation else ()):
+        if field is not None:
+            found[numbers == number] *= field.at(points[numbers == number])
+    return found
 
 
 def variation_of(case: Case) -> Variation | None:

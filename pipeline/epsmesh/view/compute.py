@@ -14,6 +14,7 @@ from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.reflect import reflect, reflect_vectors
 from epsmesh.plan.steps import Solve
 from epsmesh.plan.symmetry import mirror_planes
+from epsmesh.run.fields import moduli_of
 from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
@@ -129,6 +130,10 @@ def _whole(
     whole = reflect(arrays, mirrors)
     points = whole.points + np.subtract(case.frame.point, solve.meshed_case.frame.point)
     fields = Fields(case, points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
+    if case.varies:
+        young = moduli_of(case, fields.centres, whole.regions)
+        is_known = young > 0  # in a mesh alone, some may lack
+        fields = replace(fields, young=np.where(is_known, young, young[is_known].min()) if is_known.any() else None)
     if whole.regions is None:
         return fields
     # Where layers fill the body nothing is left of the tissue that has number 0.

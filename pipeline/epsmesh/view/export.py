@@ -22,8 +22,9 @@ def write_fields(fields: Fields, path: Path) -> Path:
     """Write ``fields`` to ``path``, ``….vtu``, in place of an earlier file only once it is whole.
 
     At points: ``displacement`` (m), ``on_probe`` and ``on_support`` (1 or 0). In cells: ``element_size`` (m),
-    ``max_strain`` (largest principal strain by magnitude), ``within_epsilon`` (1 or 0) and ``region``; ``stress``
-    (Pa, nine components, at the cell's centre) and ``von_mises``. The cells have the displacement's degree.
+    ``max_strain`` (largest principal strain by magnitude), ``within_epsilon`` (1 or 0), ``region``, and ``young`` (Pa)
+    where it varies within a region; ``stress`` (Pa, nine components, at the cell's centre) and ``von_mises``. The cells
+    have the displacement's degree.
     """
     points, cells, displacement = fields.points, fields.cells, fields.displacement
     if (nodes := fields.nodes) is not None:
@@ -49,6 +50,8 @@ def _mesh(fields: Fields, points: np.ndarray, cells: np.ndarray, displacement: n
         at_points["displacement"] = displacement
     if fields.strain is not None:
         in_cells["max_strain"] = fields.strain
+    if fields.young is not None:
+        in_cells["young"] = fields.young
     if fields.stress is not None:
         in_cells |= {"stress": fields.stress.reshape(-1, 9), "von_mises": von_mises(fields.stress)}
     of_vtk = cells[:, compat.vtk_order(cells.shape[1])]

@@ -25,6 +25,7 @@ class Fields:
     ("x": x = 0); ``dofs`` counts the whole body's unknowns. ``regions`` (m,) numbers the material of each cell, by its
     position in ``region_names``; None where there is one only. ``force`` (N) is the probe's, with its relative error
     bar ``force_error``; not a number where they were not asked for. ``on_meridian`` tells that it was found there.
+    ``young`` (m,), Pa, is the modulus in the middle of each cell, where it varies within a region; otherwise None.
     ``nodes`` are those of the displacement's elements, in the order of the cells, and ``stress`` (m, 3, 3), Pa, is that
     at the centre of each cell; None where they were not asked for.
     """
@@ -44,6 +45,7 @@ class Fields:
     on_meridian: bool = False
     nodes: LagrangeNodes | None = None
     stress: FloatArray | None = None
+    young: FloatArray | None = None
 
     @property
     def contact(self) -> FloatArray:

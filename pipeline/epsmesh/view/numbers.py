@@ -16,7 +16,7 @@ from epsmesh.view.fields import Fields
 from epsmesh.view.palette import VIRIDIS, YLGNBU, YLORRD, region_colours
 from epsmesh.view.tool import tool_of
 
-_MM = 1e3
+_MM, _KPA = 1e3, 1e-3
 # Numbers that the script knows groups of the boundary by; 0 is free.
 _GROUPS = {PROBE: 1, FIXED: 2, CUT: 3}
 # Strains are shown over this range below the largest, which the singular edge of the probe has.
@@ -39,8 +39,8 @@ def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
     ``points`` (3, n) in mm from the contact; ``cells`` (4, m), each number the difference to the corner before it, the
     first one's to the cell before; ``faces`` of the boundary, 4 × cell + the corner that it lies opposite to, each the
     difference to the one before, and their ``groups``; ``shift`` (3, n), displacements in units of :func:`shift_unit`;
-    ``regions``, ``sizes`` and ``strains`` (m), the last two in 0 … 255 of the scale of their colours; ``tool_points``,
-    ``tool_moved`` (k, 3), mm, and ``tool_triangles``.
+    ``regions``, ``sizes``, ``young`` and ``strains`` (m), the last three in 0 … 255 of the scale of their colours;
+    ``tool_points``, ``tool_moved`` (k, 3), mm, and ``tool_triangles``.
     """
     sizes, (used, number) = fields.sizes, _along_curve(fields.points, fields.cells[:, :4])
     corners = np.sort(number[fields.cells[:, :4]], axis=1)
@@ -58,6 +58,8 @@ def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
         "tool_moved": (_MM * tool.moved).astype("<f4"),
         "tool_triangles": tool.triangles.astype("<i4"),
     }
+    if fields.young is not None:
+        arrays["young"] = _steps(fields.young, float(fields.young.min()))[order]
     if fields.displacement is not None and fields.strain is not None:
         arrays["shift"] = np.round(fields.displacement[used] / shift_unit(fields)).T.astype("<i2")
         arrays["strains"] = _steps(fields.strain, _STRAINS * float(fields.strain.max()))[order]
@@ -79,12 +81,16 @@ def colours_of(fields: Fields) -> list[dict[str, Any]]:
     names, sizes = list(fields.region_names), _MM * fields.sizes
     regions = {"name": "region", "array": "regions", "labels": names, "stops": region_colours(len(names))}
     size = _scale("element size", "mm", float(sizes.min()), float(sizes.max()), VIRIDIS, array="sizes")
+    last = [size]
+    if (young := fields.young) is not None:
+        low, high = _KPA * float(young.min()), _KPA * float(young.max())
+        last = [_scale("Young's modulus", "kPa", low, high, VIRIDIS, array="young"), size]
     if fields.displacement is None or fields.strain is None:
-        return [regions, size]
+        return [regions, *last]
     largest, worst = float(fields.magnitude.max()), 100 * float(fields.strain.max())
     unit, factor = unit_of_length(largest)
     strain = _scale("largest principal strain", "%", _STRAINS * worst, worst, YLORRD, array="strains")
-    return [regions, _scale("displacement", unit, 0.0, factor * largest, YLGNBU), strain, size]
+    return [regions, _scale("displacement", unit, 0.0, factor * largest, YLGNBU), strain, *last]
 
 
 def _scale(name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "") -> dict[str, Any]:
