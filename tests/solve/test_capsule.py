@@ -11,8 +11,6 @@ from epsmesh.run.loads import terms_of
 from epsmesh.run.meshing import mesh_case
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.spaces import Spaces
-from epsmesh_identify.layered.body import LayeredBody
-from epsmesh_identify.layered.compliance import Layer
 from tests.cases import force, refusal, solve, solved, study
 from tests.cases import raw as changes_of
 
@@ -52,25 +50,6 @@ def test_a_stretched_membrane_under_a_disc():
     known = 2 * pi * 3 * 0.2e-3 / log(30 / 3)
     assert found.force == pytest.approx(known, rel=2e-3)
     assert abs(found.force / known - 1) < found.force_error
-
-
-def test_it_is_the_limit_of_a_thin_layer():
-    """A frictionless disc of radius a: layers of a/25 and a/50 of an integral equation, extrapolated to none."""
-    radius, height, young, stiff = 1e-3, 2.5e-3, 10e3, 2.0
-
-    def layered(thickness):
-        layers = Layer(stiff / thickness, 0.3, thickness), Layer(young, 0.3, height)
-        return LayeredBody(layers).punch(radius) * 0.01e-3
-
-    thick, thin = layered(radius / 25), layered(radius / 50)
-    body = {"shape": "cylinder", "size": None, "radius": "14 mm", "height": "2.5 mm", "fixed": "bottom"}
-    body["capsule"] = {"young": "20 kPa", "thickness": "0.1 mm", "poisson": 0.3, "on": "top"}
-    tool = {"radius": "1 mm", "depth": "0.01 mm", "contact": "frictionless"}
-    found = solved(body=body, probe=tool, mesh={"fine": "1 mm", "coarse": "2 mm", "rim": "0.1 mm"})
-    assert abs(found.force / (2 * thin - thick) - 1) < found.force_error + 1e-3
-    assert found.force == pytest.approx(thin, rel=0.015)
-    without = LayeredBody((Layer(young, 0.3, height),)).punch(radius) * 0.01e-3
-    assert found.force > without * 1.03
 
 
 @pytest.mark.parametrize(

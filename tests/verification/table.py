@@ -7,6 +7,7 @@ from mpi4py import MPI
 from epsmesh.solve.compiled import compiling
 from epsmesh.verify import Row
 from tests.verification.bodies import body_rows
+from tests.verification.capsules import capsule_rows
 from tests.verification.compliance import compliance_rows
 from tests.verification.contact import contact_rows
 from tests.verification.elements import element_rows
@@ -25,7 +26,8 @@ from tests.verification.wedges import wedge_rows
 
 _OF_SCENES = (
     scene_rows, region_rows, body_rows, contact_rows, wedge_rows, slit_rows, insertion_rows, needle_rows,
-    far_field_rows, path_rows, load_rows, hyperelastic_rows, relaxation_rows, layer_rows, compliance_rows,
+    far_field_rows, path_rows, load_rows, hyperelastic_rows, relaxation_rows, layer_rows, capsule_rows,
+    compliance_rows,
 )  # fmt: skip
 
 

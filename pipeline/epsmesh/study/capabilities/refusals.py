@@ -46,6 +46,7 @@ _OF_LAW = "with a law of large displacements"
 _NO_DERIVATIVES = {
     "friction": "with friction, F is no derivative of an energy: omit it, or friction",
     "loads that move the surface": f"the loads decide where the depth begins: {_NO_LOADS}, or omit it",
+    "tension of the capsule": "the tension decides where the depth begins: omit it, or the tension",
     "half ball": 'tissue beyond the cut decides a part of F: omit it, or use outside = "coarse"',
     "slit": "the force of a blade in a slit has a part at the slit's front: omit it",
     "insertion": "along an insertion, F has parts of fracture and friction: omit it",
@@ -239,7 +240,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
     Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
-    Refusal("influence", "tension of the capsule", "the tension decides where the depth begins: omit one of the two"),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
 
