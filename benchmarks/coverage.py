@@ -11,16 +11,16 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from statistics import median
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from benchmarks.campaigns import each, ended_soon, finite
 from benchmarks.families import FAMILIES
-from benchmarks.tables import options
-from epsmesh.plan.plan import make_plan
+from benchmarks.scenes import record_of
+from benchmarks.tables import markdown, options
 from epsmesh.plan.recipe import half_width_of
-from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
@@ -32,6 +32,7 @@ _NAIVE = 0.35
 # Limits for every group with enough trials: coverage, and median bar over error. A family of scenes may have its own
 # limit of the median: where F is no bound, a bar applies to both sides.
 HELD, IDLE, ENOUGH = 0.95, 2.0, 40
+_SOLVE = {"solve": {"exact": False}}
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,19 @@ class Group:
         """The largest error, in units of its bar."""
         return max((1 / trial.ratio for trial in self.served if not trial.message), default=nan)
 
+    @property
+    def row(self) -> dict[str, Any]:
+        """What a table has of the group."""
+        return {
+            "name": self.name,
+            "cases": len(self.trials),
+            "served": len(self.served),
+            "held": self.held,
+            "share": self.share,
+            "median_bar_over_error": self.ratio,
+            "worst": self.worst,
+        }
+
     def is_met(self, idle: float) -> bool:
         """Return whether coverage is 95 %, and the median bar at most ``idle`` errors."""
         return self.share >= HELD and self.ratio <= idle
@@ -140,25 +154,13 @@ class Coverage:
 
     def __str__(self) -> str:
         """The table, one line per group."""
-        lines = [_LINE.format("", "held", "", "bar / |error|", "worst", "refused")]
-        lines += [
-            _LINE.format(
-                group.name,
-                f"{group.held} of {len(group.served)}",
-                f"{group.share:.1%}",
-                f"{group.ratio:.2f}",
-                f"{group.worst:.2f}",
-                len(group.trials) - len(group.served),
-            )
-            for group in self.groups
-        ]
-        asked = (
-            f"asked for, of groups of {ENOUGH} and more: {HELD:.0%} held, median of bar / |error| at most {self.idle:g}"
-        )
-        return "\n".join([*lines, f"{asked}: {'met' if self.is_met else 'NOT MET'}"])
+        table = markdown([group.row for group in self.groups], _COLUMNS)
+        asked = f"{HELD:.0%} held, median of bar / error at most {self.idle:g}"
+        return f"{table}asked for, of groups of {ENOUGH} and more: {asked}: {'met' if self.is_met else 'NOT MET'}"
 
 
-_LINE = "{:32} {:>12} {:>7} {:>14} {:>6} {:>8}"
+_COLUMNS = {"name": "", "cases": "d", "served": "d", "held": "d", "share": ".1%", "median_bar_over_error": ".2f",
+            "worst": ".2f"}  # fmt: skip
 
 
 def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "design") -> Iterator[Trial]:
@@ -172,7 +174,8 @@ def trials(comm: MPI.Comm, count: int = COUNT, seed: int = SEED, family: str = "
             k: mesh[k] for k in ("epsilon", "outside") if mesh["outside"] != "coarse"
         }
         try:
-            case, truth = _solve(comm, scene, mesh, ("axisymmetric",)), _solve(comm, scene, truth_mesh)
+            case = record_of({**scene, "mesh": mesh, **_SOLVE}, ("axisymmetric",), comm)
+            truth = record_of({**scene, "mesh": truth_mesh, **_SOLVE}, comm=comm)
         except StudyError:  # an invalid draw: a footprint over the edge, a ratio that locks
             continue
         done += 1
@@ -211,12 +214,6 @@ def _trial(scene: Section, mesh: Section, case: Record, truth: Record) -> Trial:
         "naive" if rim > _NAIVE else "graded",
         refused=not case.is_ok and not message,
     )
-
-
-def _solve(comm: MPI.Comm, scene: Section, mesh: Section, without: tuple[str, ...] = ()) -> Record:
-    study = parse({**scene, "mesh": mesh, "solve": {"exact": False}})
-    (record,) = compute(make_plan(study, without=without), comm).values()
-    return record
 
 
 def _name(scene: Section, mesh: Section) -> str:
@@ -274,17 +271,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _data(found: Coverage) -> object:
-    groups = [
-        {
-            "name": group.name,
-            "cases": len(group.trials),
-            "served": len(group.served),
-            "held": group.held,
-            "median_bar_over_error": group.ratio,
-            "worst": group.worst,
-        }
-        for group in found.groups
-    ]
+    groups = [group.row for group in found.groups]
     return finite({"met": found.is_met, "groups": groups, "trials": [asdict(trial) for trial in found.trials]})
 
 

@@ -6,10 +6,6 @@ checked for the first time and again, and maps of a liver with a tumour on one r
 takes three minutes.
 """
 
-import os
-import subprocess
-import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from shutil import copy
@@ -20,10 +16,9 @@ import igl
 from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
-from benchmarks.machine import MPI_ENVIRONMENT
 from benchmarks.one_run import stages_by
-from benchmarks.processor import MPIRUN, processor_seconds
-from benchmarks.tables import markdown, write
+from benchmarks.processor import command, processor_seconds
+from benchmarks.tables import markdown, options, write
 from epsmesh import stages
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.compile import prepare
@@ -162,17 +157,6 @@ def measure(name: str, folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def command(*arguments: str, folder: Path) -> float:
-    """Return the processor seconds of a command of the program that works in ``folder``."""
-    start = processor_seconds()
-    surroundings = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(MESHES.parent)}
-    if arguments[0] == "plan":  # the cache of checked files must be empty
-        surroundings["EPSMESH_CACHE"] = str(folder / "cache")
-    whole = [sys.executable, "-m", "epsmesh", *arguments]
-    subprocess.run(whole, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=surroundings)
-    return processor_seconds() - start
-
-
 def whole_commands(folder: Path) -> list[dict[str, Any]]:
     """Return the times of whole commands: one place of the liver, the same when stored, a large file planned."""
     body, _, probe, places = SCENES["liver, disc"]
@@ -194,7 +178,9 @@ def whole_commands(folder: Path) -> list[dict[str, Any]]:
         "again": check,
         f"plan, {len(found.facets):,} facets": ("plan", "liver.toml", "--output", "elsewhere"),
     }
-    return [{"what": what, "seconds": command(*arguments, folder=folder)} for what, arguments in told.items()]
+    caches = {"plan": {"EPSMESH_CACHE": str(folder / "cache")}}  # of checked files, empty at first
+    spent = {what: command(*words, folder=folder, **caches.get(words[0], {}))[1] for what, words in told.items()}
+    return [{"what": what, "seconds": seconds} for what, seconds in spent.items()]
 
 
 def on_ranks(tool: str, probe: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -203,20 +189,17 @@ def on_ranks(tool: str, probe: dict[str, Any], folder: Path) -> dict[str, Any]:
     body = LIVER | {"inclusion": [TUMOUR]}
     (folder / "map.toml").write_text(to_toml(study_of((body, [0.45], probe, places)), "map"))
     row: dict[str, Any] = {"tool": tool, "places": len(places)}
-    paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(MESHES.parent)}
     for ranks, name in ((1, "one rank"), (2, "two")):
         where = ("--output", f"results-{tool}-{ranks}", "--meshes", f"meshes-{tool}-{ranks}")
-        command = [*MPIRUN, str(ranks), sys.executable, "-m", "mpi4py", "-m", "epsmesh", "run", "map.toml", *where]
-        start = time.perf_counter()
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=folder, env=paths)
-        row[name] = time.perf_counter() - start
+        row[name], _ = command("run", "map.toml", *where, folder=folder, ranks=ranks)
     row["ratio"] = row["one rank"] / row["two"]
     print(markdown([row], ON_RANKS).splitlines()[-1], flush=True)
     return row
 
 
-def main(output: Path = Path("results")) -> None:
+def main() -> None:
     """Measure, print, and write ``organs.json`` and ``organs.md``."""
+    output = options(__doc__).parse_args().output
     with TemporaryDirectory(prefix="organs-") as folder:
         rows = [row for name in SCENES for row in measure(name, Path(folder))]
     with TemporaryDirectory(prefix="organs-") as folder:

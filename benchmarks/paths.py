@@ -6,10 +6,6 @@ figure. Eight places, drawn at random, are then solved: ``missed`` is the larges
 units of the error bar of the first.
 """
 
-import os
-import subprocess
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,8 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from benchmarks.machine import MPI_ENVIRONMENT
-from benchmarks.processor import MPIRUN, ROOT, processor_seconds, run
+from benchmarks.processor import ROOT, command, run
 from benchmarks.scenes import BOX, DISC, study
 from benchmarks.tables import Table, options
 from epsmesh.study.toml import to_toml
@@ -118,11 +113,7 @@ def on_map(name: str) -> dict[str, Any]:
     with TemporaryDirectory(prefix="map-") as folder:
         file = Path(folder) / "map.toml"
         file.write_text(to_toml(scene, name))
-        paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        words = [*MPIRUN, "2", sys.executable, "-m", "mpi4py", "-m", "epsmesh", "run", str(file), "--output", folder]
-        start, before = time.perf_counter(), processor_seconds()
-        subprocess.run([*words, "-q"], check=True, env=paths, cwd=folder)
-        elapsed, spent = time.perf_counter() - start, processor_seconds() - before
+        elapsed, spent = command("run", str(file), "--output", folder, "-q", folder=Path(folder), ranks=2)
         found, of_run = (xr.load_dataset(file.with_suffix(".nc"), group=group) for group in (None, "run"))
     force, bar = found["force"].values.ravel(), (found["force_error"] / found["force"]).values.ravel()
     is_solved = (of_run["origin"] == "solved").values.ravel()

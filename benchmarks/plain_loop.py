@@ -11,9 +11,6 @@ shows what the reductions save. All use cached compiled forms.
 
 import os
 import re
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -26,7 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.machine import machine
 from benchmarks.plain_case import MOST_DIRECT, SOLVERS, Solved, solve
-from benchmarks.processor import ROOT, processor_seconds
+from benchmarks.processor import ROOT, command
 from benchmarks.tables import markdown, options, write
 from epsmesh.arrays import FloatArray
 from epsmesh.plan import estimate
@@ -71,27 +68,15 @@ def run_program(study: Study, folder: Path, *, exact: bool = True, parts: int = 
     file = folder / f"{study.name}.toml"
     file.write_text(text)
     places = ["--store", str(folder / "cases.sqlite"), "--meshes", str(folder / "meshes")]
-    whole = ("--without", "all")
-    used, start = processor_seconds(), time.perf_counter()
-    if parts:
-        _epsmesh("run", file, "--quiet", *whole, "--shard", f"1/{parts}", *places[2:])
-    else:
-        _epsmesh("run", file, "--quiet", "--fresh", *places)
-    seconds, used = time.perf_counter() - start, processor_seconds() - used
+    how = ["--without", "all", "--shard", f"1/{parts}", *places[2:]] if parts else ["--fresh", *places]
+    words = ("run", str(file), "--output", str(folder), "--quiet", *how)
+    seconds, used = command(*words, folder=folder, most=1)
     if parts:
         plan = make_plan(read_study(file), without=("all",))
         with open_to_read(Shard(1, parts).store(folder, plan.study)) as store:
             publish(plan, store.get(plan.all_keys), {}, folder)
     often = max(parts, 1)
     return {"seconds": often * seconds, "cpu": often * used, "dataset": folder / f"{study.name}.nc"}
-
-
-def _epsmesh(command: str, file: Path, *words: str) -> None:
-    whole = [sys.executable, "-m", "epsmesh", command, str(file), "--output", str(file.parent), *words]
-    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)
-    done = subprocess.run(whole, env=os.environ | {"PYTHONPATH": path}, check=False)
-    if done.returncode > 1:
-        raise RuntimeError(f"the program ended with status {done.returncode}")
 
 
 def run_loop(cases: Sequence[tuple[Case, float]], solver: str, most_direct: int) -> list[Solved]:

@@ -50,6 +50,22 @@ def median_seconds(ways: Mapping[str, Callable[[], Any]], repeats: int) -> dict[
     return {name: statistics.median(seconds) for name, seconds in found.items()}
 
 
+def command(*words: str, folder: Path, ranks: int = 0, most: int = 0, **environment: str) -> tuple[float, float]:
+    """Run a command of the program in ``folder``, on ``ranks``; return its elapsed and its processor seconds.
+
+    Raises:
+        RuntimeError: if it ends with a status above ``most``.
+    """
+    many = [*MPIRUN, str(ranks), sys.executable, "-m", "mpi4py"] if ranks else [sys.executable]
+    paths = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(ROOT)} | environment
+    start, before = time.perf_counter(), processor_seconds()
+    whole = [*many, "-m", "epsmesh", *words]
+    done = subprocess.run(whole, check=False, stdout=subprocess.DEVNULL, cwd=folder, env=paths)
+    if done.returncode > most:
+        raise RuntimeError(f"{' '.join(words)}: status {done.returncode}")
+    return time.perf_counter() - start, processor_seconds() - before
+
+
 def ask(
     words: Sequence[str],
     ranks: int = 0,

@@ -1,6 +1,14 @@
 """Scenes shared by benchmarks, and studies of them."""
 
+from dataclasses import replace
 from typing import Any
+
+from mpi4py import MPI
+
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.study.read import parse
 
 BOX = {"shape": "box", "size": ["60 mm", "60 mm", "20 mm"], "fixed": "bottom"}
 DISC = {"shape": "disc", "radius": "2 mm", "depth": "0.2 mm"}
@@ -12,6 +20,16 @@ def study(
     """Return a study of tissue of 10 kPa, without F_exact."""
     material = {"young": "10 kPa", "poisson": poisson}
     return {"body": body, "material": material, "probe": probe, "mesh": mesh, "solve": {"exact": False}}
+
+
+def record_of(asked: dict[str, Any], without: tuple[str, ...] = (), comm: MPI.Comm = MPI.COMM_SELF) -> Record:
+    """Return the record of a study of one case, its message on one line; collective.
+
+    Raises:
+        StudyError: if the study is not valid.
+    """
+    (record,) = compute(make_plan(parse(asked), without=without), comm).values()
+    return replace(record, message=" ".join(record.message.split()))
 
 
 def graded(fine: str, coarse: str, rim: str, growth: float, **others: Any) -> dict[str, Any]:

@@ -22,6 +22,7 @@ import psutil
 from mpi4py import MPI
 
 from benchmarks.scenes import many_small
+from benchmarks.tables import options
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.execute import execute
 from epsmesh.run.progress import Progress
@@ -106,4 +107,6 @@ def main(cases: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else CASES))
+    parser = options(__doc__, writes=False)
+    parser.add_argument("cases", nargs="?", type=int, default=CASES)
+    sys.exit(main(parser.parse_args().cases))

@@ -20,13 +20,11 @@ from mpi4py import MPI
 
 from benchmarks.campaigns import each, ended_soon, finite
 from benchmarks.processor import alone
+from benchmarks.scenes import record_of
 from benchmarks.stress_cells import Cell, cells
 from benchmarks.tables import options
-from epsmesh.plan.plan import make_plan
-from epsmesh.run.execute import compute
 from epsmesh.run.record import UNFORESEEN, Record
 from epsmesh.study.problems import StudyError
-from epsmesh.study.read import parse
 
 # Largest relative change under an exact invariance.
 INVARIANT = 1e-8
@@ -165,7 +163,7 @@ class _Matrix:
     def _record(self, cell: Cell) -> Record:
         if cell.ranks:
             return _on_ranks(cell.ranks, cell.study)
-        return _compute(self._comm, cell.study, without=_WITHOUT)
+        return record_of(cell.study, _WITHOUT, self._comm)
 
     def _truth(self, cell: Cell) -> Record:
         """Return the force of the cell's scene at a required accuracy; if it is not reached, the bar is wider."""
@@ -178,16 +176,10 @@ class _Matrix:
         key = json.dumps(scene, sort_keys=True)
         if key not in self._truths:
             try:
-                self._truths[key] = _compute(self._comm, scene)
+                self._truths[key] = record_of(scene, comm=self._comm)
             except StudyError as error:
                 self._truths[key] = Record("", "failed", str(error))
         return self._truths[key]
-
-
-def _compute(comm: MPI.Comm, scene: dict[str, Any], without: tuple[str, ...] = ()) -> Record:
-    """Return the record of a study of one case."""
-    (record,) = compute(make_plan(parse(scene), without=without), comm).values()
-    return replace(record, message=" ".join(record.message.split()))
 
 
 def _why_not(comm: MPI.Comm) -> str:

@@ -2,40 +2,30 @@
 
 F of the scene is known to 1e-7: a disc of 3 mm, bonded, on a cylinder of R = H = 50 mm. Runs are warm (forms compiled,
 libraries loaded), alone, on one core; times are medians. Run it on an idle machine; it takes ten minutes.
+It writes work_precision.json and work_precision.md into the folder of results.
 """
 
-import argparse
 import itertools
 import statistics
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import xarray as xr
-from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from benchmarks.campaigns import ended_soon
-from benchmarks.machine import machine
-from benchmarks.work_precision_figure import draw
-from epsmesh.files import result_files, why_not_writable
+from benchmarks.scenes import record_of, study
+from benchmarks.tables import Table, options
 from epsmesh.mesh.meridian import Meridian
-from epsmesh.netcdf import write_netcdf
-from epsmesh.plan.plan import make_plan
-from epsmesh.run.execute import compute
 from epsmesh.run.record import Record
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.meridian.problem import MeridianProblem
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.study.read import parse
 from tests.verification import known
 
-NAME = "work_precision"
 POISSON = (0.3, 0.49)
 YOUNG, DEPTH = 10e3, 1e-4
 
@@ -78,11 +68,21 @@ METHODS = (
 # Required accuracies, for the automatic choice of meshes in three dimensions.
 ASKED = ("2 %", "1 %", "0.3 %", "0.1 %")
 AXISYMMETRIC = (4, 5, 6)  # degrees; the error bar of lower ones exceeds the solver's limit
+COLUMNS = {
+    "method": "",
+    "poisson": "g",
+    "dofs": "d",
+    "seconds": ".3f",
+    "estimate_seconds": ".2f",
+    "error": ".4%",
+    "bar": ".4%",
+    "iterations": "d",
+}
 
 
 @dataclass(frozen=True)
 class Point:
-    """One run of one method: its cost, and the error of F."""
+    """One run of one method: its cost, medians of warm runs in seconds, and the relative error of F."""
 
     method: str
     poisson: float
@@ -112,19 +112,11 @@ def measure(repeats: int, *, quick: bool = False) -> Iterator[Point]:
 
 
 def _point(name: str, nu: float, level: int, mesh: dict[str, Any], without: tuple[str, ...], repeats: int) -> Point:
-    study = parse(
-        {
-            "body": known.CYLINDER_BODY,
-            "material": {"young": "10 kPa", "poisson": nu},
-            "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"},
-            "mesh": mesh,
-            "solve": {"exact": False},
-        }
-    )
-    plan = make_plan(study, without=("axisymmetric", *without))
+    probe = {"shape": "disc", "radius": "3 mm", "depth": "0.1 mm"}
+    scene = study(known.CYLINDER_BODY, nu, probe, mesh)
     runs: list[Record] = []
     for _ in range(repeats + 1):  # the first run warms up
-        (record,) = compute(plan, MPI.COMM_SELF).values()
+        record = record_of(scene, ("axisymmetric", *without))
         if not isfinite(record.force):  # error bars above 100 % are allowed here
             raise RuntimeError(f"{name}, ν = {nu:g}: {record.message}")
         runs.append(record)
@@ -159,65 +151,18 @@ def _meridians(nu: float, repeats: int) -> Iterator[Point]:
         yield Point("axisymmetric, by degree", nu, level, error, last.bar, seconds, 0.0, last.dofs, 1)
 
 
-def dataset(points: list[Point], repeats: int) -> xr.Dataset:
-    """Arrange points by method, Poisson's ratio and level."""
-    methods = list(dict.fromkeys(p.method for p in points))
-    levels = range(max(p.level for p in points) + 1)
-    shape = (len(methods), len(POISSON), len(levels))
-    units = {"error": "1", "bar": "1", "seconds": "s", "estimate_seconds": "s", "dofs": "1", "iterations": "1"}
-    names = {
-        "error": "relative error of F",
-        "bar": "relative error bar on F",
-        "seconds": "run time, median, warm",
-        "estimate_seconds": "run time of the error bar, not in seconds",
-        "dofs": "unknowns of the whole body",
-        "iterations": "iterations of the linear solver",
-    }
-    variables = {}
-    for name, unit in units.items():
-        values = np.full(shape, np.nan)
-        for p in points:
-            values[methods.index(p.method), POISSON.index(p.poisson), p.level] = getattr(p, name)
-        attributes = {"units": unit, "long_name": names[name]}
-        variables[name] = (("elements", "poisson", "level"), values, attributes)
-    coordinates = {"elements": methods, "poisson": list(POISSON), "level": list(levels)}
-    return xr.Dataset(variables, coordinates, {"title": "Work against precision"} | machine() | {"repeats": repeats})
-
-
-def outputs(output: Path) -> list[Path]:
-    """Return the files that :func:`main` writes into ``output``."""
-    return result_files(output, NAME)
-
-
-def main(output: Path, repeats: int, *, quick: bool = False) -> list[Path]:
-    """Measure, print a table, and write dataset and figure into ``output``; return the files."""
-    print(f"{'method':26} {'ν':>5} {'dofs':>8} {'seconds':>8} {'bar':>6} {'error':>10} {'bar':>9} {'its':>4}")
-    points = []
-    for p in measure(repeats, quick=quick):
-        points.append(p)
-        print(
-            f"{p.method:26} {p.poisson:5g} {p.dofs:8d} {p.seconds:8.3f} {p.estimate_seconds:6.2f} "
-            f"{100 * p.error:9.4f}% {100 * p.bar:8.4f}% {p.iterations:4d}",
-            flush=True,
-        )
-    found = dataset(points, repeats)
-    path = outputs(output)[0]
-    write_netcdf(found, path)
-    return [path, *draw(found, path.with_suffix(""))]
-
-
-def command(arguments: list[str]) -> None:
-    """Run from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.work_precision", description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("results"), metavar="DIR")
-    parser.add_argument("--repeats", type=int, default=3, metavar="N", help="runs of each point; the median counts")
+def main(arguments: list[str]) -> None:
+    """Measure, print and write."""
+    parser = options(__doc__)
+    parser.add_argument("--repeats", type=int, default=3, help="runs of each point; the median counts")
     parser.add_argument("--quick", action="store_true", help="a few points")
-    options = parser.parse_args(arguments)
-    if wrong := [why for path in outputs(options.output) if (why := why_not_writable(path))]:
-        parser.error(wrong[0])
+    asked = parser.parse_args(arguments)
+    table = Table(COLUMNS)
     with ended_soon():
-        print(*main(options.output, max(options.repeats, 1), quick=options.quick), sep="\n")
+        for point in measure(max(asked.repeats, 1), quick=asked.quick):
+            table.add(asdict(point))
+    table.write("work_precision", asked.output)
 
 
 if __name__ == "__main__":
-    command(sys.argv[1:])
+    main(sys.argv[1:])
