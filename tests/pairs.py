@@ -303,7 +303,8 @@ FEATURES = (
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
     Feature("output", "output", _output),
     Feature("influence", "influence", _update("solve", influence=True)),
-    Feature("spread", "spread", _update("material", spread={"young": "30 %", "correlation_length": "5 mm"})),
+    # A spread asks for the influence: the two are one feature.
+    Feature("spread", "influence", _update("material", spread={"young": "30 %", "correlation_length": "5 mm"})),
 )  # fmt: skip
 
 

@@ -129,7 +129,7 @@ def test_friction_in_time_is_that_of_the_load_path(material):
     assert found.forces[6, 2] == pytest.approx(static.reaction[2], rel=6e-4)  # other steps
     assert found.forces[-1, 2] == pytest.approx(found.forces[6, 2], rel=1e-6)  # nothing relaxes
     (small, _), (none, _) = (
-        followed(HOLD, TERMS, 2, probe=BALL | more, material=material) for more in ({"friction": 1e-6}, {})
+        followed(HOLD, TERMS, 8, probe=BALL | more, material=material) for more in ({"friction": 1e-6}, {})
     )
     assert small.forces[:, 2] == pytest.approx(none.forces[:, 2], rel=1e-6)
     assert small.dissipated == pytest.approx(none.dissipated, abs=5e-5 * none.dissipated[-1])  # residuals differ

@@ -309,7 +309,7 @@ def test_stress_has_the_field(law, poisson):
     known = layer.at(points).stress
     assert field.at(points).stress == pytest.approx(known, rel=1e-5, abs=1e-5 * np.abs(known).max())
     if poisson == 0.49:
-        assert field.whole_pressure().x.norm() > 0
+        assert field.whole_pressure().x.array.any()
         of_layer = layer.whole_pressure()
         values = np.asarray(of_layer.x.array)[compat.cell_dofs(of_layer.function_space)]
         whole = field.whole_pressure()

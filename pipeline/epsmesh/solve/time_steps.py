@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from math import ceil
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -295,8 +296,9 @@ class TimeSteps:
                 raise
             return PathPoint(part, self._state.array), True
 
+        equal = max(1.0, ceil(self.fewest * abs(rise) - 1e-9))  # not three quarters and a quarter
         try:
-            follow(Path(PathPoint(0.0, self._state.array)), solve_at, 1.0, fewest=max(1.0, self.fewest * abs(rise)))
+            follow(Path(PathPoint(0.0, self._state.array)), solve_at, 1.0, fewest=equal)
         except LargeError as error:
             raise self._stopped(course, error) from error
 
