@@ -21,7 +21,11 @@ def _solved(folder, values, affine, **changes):
     return solve_fields(solve, MPI.COMM_SELF, bar=True, influence=True)
 
 
-@pytest.mark.parametrize("law", [{}, {"law": "neo-hookean"}, {"poisson": 0.49}], ids=str)
+@pytest.mark.parametrize(
+    "law",
+    [{}, *(pytest.param(law, marks=pytest.mark.nightly) for law in ({"law": "neo-hookean"}, {"poisson": 0.49}))],
+    ids=str,
+)
 def test_it_is_the_change_of_a_solve_with_wider_voxels(tmp_path, law):
     x, _, z = np.indices((24, 24, 12))
     values = 10.0 + 3.0 * np.exp(-z / 6) * np.sin(2 * x / 3) + 0.5 * z

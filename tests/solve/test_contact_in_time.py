@@ -135,7 +135,7 @@ def test_friction_in_time_is_that_of_the_load_path(material):
     assert small.dissipated == pytest.approx(none.dissipated, abs=5e-5 * none.dissipated[-1])  # residuals differ
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.nightly)])
 def test_bars_of_few_steps_hold(friction):
     """The bar is from half as many steps, although the rate may change at each time; 16 times the steps tell it."""
     changes = {"material": {"poisson": 0.2}, "probe": BALL | {"depth": "2 mm", "friction": friction}}
