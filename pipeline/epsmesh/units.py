@@ -40,7 +40,7 @@ bar = 1e5 * pascal
 percent = 0.01 = %
 radian = [] = rad
 degree = 3.14159265358979323846 / 180 * radian = deg = °
-""".strip().splitlines()
+"""
 
 
 @dataclass(frozen=True)
@@ -101,11 +101,12 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)\b", re.IGNORECASE)
 
 
 @cache
-def _registry() -> "pint.UnitRegistry":
+def registry_of(definitions: str) -> "pint.UnitRegistry":
+    """Return the registry with these units alone, each defined by a line of the text."""
     import pint  # noqa: PLC0415 (a tenth of a second, which most studies do without)
 
     registry = pint.UnitRegistry(None)
-    for line in _DEFINITIONS:
+    for line in definitions.strip().splitlines():
         registry.define(line)
     return registry
 
@@ -164,13 +165,13 @@ def _factor(text: str, unit: str) -> float:
     if not _UNIT.fullmatch(text):
         raise _refusal(unit, f"one number and one unit are taken, and `{text}` is no unit; {allowed}{_foreign(text)}")
     for symbol, _ in _FACTOR.findall(text):
-        if symbol not in _registry():
+        if symbol not in registry_of(_DEFINITIONS):
             meant = next((u for u in kind.units if u.casefold() == text.casefold()), None)
             raise _refusal(unit, f"unknown unit `{symbol}`; " + (f"did you mean {meant}?" if meant else allowed))
     is_pure = any(symbol in pure for pure in _PURE.values() for symbol, _ in _FACTOR.findall(text))
     if is_pure and text not in _PURE.get(unit, ()):
         raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
-    quantity = _registry().Quantity(1.0, text.replace("**", "^"))
+    quantity = registry_of(_DEFINITIONS).Quantity(1.0, text.replace("**", "^"))
     if not quantity.is_compatible_with(unit) or (not is_pure and unit in _PURE):
         raise _refusal(unit, f"`{text}` is no unit of {kind.name}; {allowed}")
     return float(quantity.to(unit).magnitude)

@@ -30,7 +30,7 @@ def loaded(function: str) -> Callable[[Any], Any]:
 def _module(path: Path, sources: Sequence[Path]) -> Any:
     # By content, too: the files may have changed since this process last executed them.
     content = hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    key = f"_epsmesh_output_{path.stem}_{content}_{abs(hash(path))}"
+    key = f"_epsmesh_function_{path.stem}_{content}_{abs(hash(path))}"
     if key not in sys.modules:
         specification = importlib.util.spec_from_file_location(key, path)
         assert specification is not None and specification.loader is not None
@@ -47,9 +47,9 @@ def _module(path: Path, sources: Sequence[Path]) -> Any:
 @contextmanager
 def _beside(folder: Path, changed: Collection[Path] = ()) -> Iterator[None]:
     """Import modules of a ``folder`` first, as a script there does, and afresh those that may have changed."""
-    loaded = {name: getattr(module, "__file__", None) for name, module in [*sys.modules.items()] if changed}
-    for name in (name for name, file in loaded.items() if file and Path(file).resolve() in changed):
-        if not name.startswith("_epsmesh_output_"):
+    files = {name: getattr(module, "__file__", None) for name, module in [*sys.modules.items()] if changed}
+    for name in (name for name, file in files.items() if file and Path(file).resolve() in changed):
+        if not name.startswith("_epsmesh_function_"):
             del sys.modules[name]
     importlib.invalidate_caches()
     sys.path.insert(0, str(folder))

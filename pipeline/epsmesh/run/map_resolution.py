@@ -3,7 +3,6 @@
 import numpy as np
 
 from epsmesh import compat
-from epsmesh.run.fields import variation_of
 from epsmesh.run.solved import Solved
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.variation import places
@@ -15,9 +14,9 @@ def change_with_wider_voxels(solved: Solved) -> tuple[float, float] | None:
     ln F changes by the influence times the relative change of the modulus, over the body. None without an image, or
     where the influence is unknown. Mesh and fields are in coordinates of the body.
     """
-    case, state = solved.solve.case, solved.state
-    images = [tissue.varying if tissue.varying and tissue.varying.file else None for tissue in case.tissues]
-    if state.influence is None or not any(images) or variation_of(case) is None:
+    state, tissues = solved.state, solved.solve.case.tissues
+    images = [tissue.varying if tissue.varying and tissue.varying.file else None for tissue in tissues]
+    if state.influence is None or not any(images):
         return None
     body, change = state.body, 0.0
     regions = np.zeros(body.owned_cells, int) if body.regions is None else body.regions[: body.owned_cells]

@@ -3,12 +3,8 @@
 import re
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
-from epsmesh.units import unit_factor
-
-if TYPE_CHECKING:
-    import pint
+from epsmesh.units import registry_of, unit_factor
 
 # A header's name and unit: "load (N)", "Z [mm]", "depth / nm", "t {s}", "depth in mm"; then "force_mN".
 _BRACKETED = re.compile(r"(?P<name>.*?)\s*[(\[{]\s*(?P<unit>[^()\[\]{}]*?)\s*[)\]}]\s*")
@@ -37,7 +33,7 @@ foot = 0.3048 * meter = ft = FT = feet
 mil = 2.54e-5 * meter = thou
 micron = 1e-6 * meter
 angstrom = 1e-10 * meter = Å = å
-""".strip().splitlines()
+"""
 # The weight (N) of a gram.
 _WEIGHT = 9.80665e-3
 _WORD = re.compile(r"[A-Za-zµÅå]+")
@@ -77,16 +73,6 @@ class Header:
 
 
 @cache
-def _registry() -> "pint.UnitRegistry":
-    import pint  # noqa: PLC0415 (a tenth of a second, which most studies do without)
-
-    registry = pint.UnitRegistry(None)
-    for line in _DEFINITIONS:
-        registry.define(line)
-    return registry
-
-
-@cache
 def _worth(text: str) -> tuple[str, float]:
     """Return m, N, s or g, and what a unit of machines is worth in it; ("", 0.0) for what is none.
 
@@ -95,8 +81,8 @@ def _worth(text: str) -> tuple[str, float]:
     plain = _LONG_PREFIX.sub(r"\1", text.strip().rstrip("."))
     spellings = [plain, plain[:1].lower() + plain[1:], plain.lower()] if len(plain) >= _LONG else [plain]
     for unit in spellings:
-        if _WORD.fullmatch(unit) and unit in _registry():
-            quantity = _registry().Quantity(1.0, unit)
+        if _WORD.fullmatch(unit) and unit in registry_of(_DEFINITIONS):
+            quantity = registry_of(_DEFINITIONS).Quantity(1.0, unit)
             kind = next(kind for kind in (*_SI, "g") if quantity.is_compatible_with(kind))
             return kind, float(quantity.to(kind).magnitude)
     return "", 0.0
@@ -134,7 +120,7 @@ def factor_of(text: str, kind: str) -> float:
 
 def written(value: float, kind: str) -> str:
     """Return a value in the SI unit ``kind`` with the prefix that people read."""
-    return f"{_registry().Quantity(value, kind).to_compact():.4g~P}"
+    return f"{registry_of(_DEFINITIONS).Quantity(value, kind).to_compact():.4g~P}"
 
 
 def is_comment(line: str) -> bool:
