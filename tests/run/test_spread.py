@@ -95,8 +95,9 @@ def test_the_bar_is_half_of_what_holds_95_per_cent_and_the_report_says_what_to_m
     assert bar.attrs["units"] == "N"
     assert bar.attrs["comment"] == "tissue ± 100 % over 1e+04 mm"
     said = unknowns(found)
-    assert "by the spread of the tissue" in said
-    assert "The largest bar is that of the tissue's spread: measure next" in said
+    assert "(tissue ± 100 % over 1e+04 mm). The tissue's spread decides: measure" in said
+    radius = 1e3 * float(found["influence_radius"].sel(decided=0.5))
+    assert f"within {radius:.2g} mm of the point of contact, where half of F is decided." in said
     assert "spread" not in unknowns(dataset())
 
 

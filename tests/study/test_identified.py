@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from epsmesh.plan.plan import make_plan
-from epsmesh.report.uncertainty import tissue
+from epsmesh.report.uncertainty import bars
 from epsmesh.study.identified import NOTHING
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_mapping, read_text
@@ -123,8 +123,9 @@ def test_forces_carry_the_bars_of_the_tissue(tmp_path, monkeypatch, correlation)
     common = correlation * (600 / 2e3) * (0.03 / 0.07)
     expected = np.sqrt(of_young**2 + of_poisson**2 + 2 * common * of_young * of_poisson)
     assert float(found["force_uncertainty"]) / force == pytest.approx(expected, rel=1e-9)
-    share = float(found["force_error"]) / (force * expected)
-    assert f"the mesh is {100 * share:.2g} % of what you do not know" in tissue(found)
+    mesh, of_tissue = bars(found)
+    assert mesh.share == pytest.approx(float(found["force_error"]) / force, rel=1e-9)
+    assert of_tissue.share == pytest.approx(expected, rel=1e-9)
 
 
 def test_relaxation_is_read_into_its_terms(tmp_path):

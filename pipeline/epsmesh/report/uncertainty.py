@@ -1,6 +1,8 @@
-"""Bars of F beside `force_error`: by an identified material, and by what an image leaves open."""
+"""Bars of F beside `force_error`: by an identified material, its spread, and by what an image leaves open."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
 
 import numpy as np
 import xarray as xr
@@ -9,18 +11,21 @@ from epsmesh.plan.plan import Plan
 from epsmesh.plan.work import EndPlans
 from epsmesh.quantities import attributes
 from epsmesh.report.influence import SPREAD
+from epsmesh.report.values import at_peak
 from epsmesh.report.words import percent
 from epsmesh.shapes.segmented import Segmented, is_uncertain
 
 NAME = "force_uncertainty"
 IMAGE = "force_image_uncertainty"
-# Bars of F, and what to do about each.
-_NEXT = {
-    "force_error": "the mesh: refine it before measuring more",
-    NAME: "the tissue's parameters: measure its mean stiffness next",
-    SPREAD: "the tissue's spread: measure next how stiff it is where F is decided (influence_radius)",
-    IMAGE: "the image: find the boundary better next",
+# Bars of F: what each is by, and what is said of it if it is the largest.
+_CAUSES = {
+    "force_error": ("mesh", "decides: refine it before you measure more"),
+    NAME: ("tissue's parameters", "decide: measure {} more exactly"),
+    SPREAD: ("tissue's spread", "decides: measure the stiffness from place to place{}"),
+    IMAGE: ("image", "decides: find the boundary more exactly"),
 }
+# The share of F within whose distance stiffness is to be measured from place to place.
+_DECIDED = 0.5
 ForceOf = Callable[[Plan], xr.DataArray]
 
 
@@ -83,45 +88,65 @@ def _like(force: xr.DataArray, other: xr.DataArray) -> xr.DataArray:
     return force.interp(time=other["time"]) if "time" in other.dims else force
 
 
+@dataclass(frozen=True)
+class Bar:
+    """An error bar of F: its ``cause``, its largest ``share`` of F over the cases, and where it is from.
+
+    A share that is not a number is not computed. ``said`` is what makes it smaller, if it is the largest.
+    """
+
+    cause: str
+    share: float
+    said: str
+    source: str = ""
+
+    @property
+    def size(self) -> str:
+        """The share as people read it."""
+        return f"± {percent(self.share)}" if isfinite(self.share) else "not computed"
+
+
+def bars(dataset: xr.Dataset) -> list[Bar]:
+    """Return the error bars of F, at the largest force of a history: that of the mesh, and those of unknown tissue."""
+    dataset, found = at_peak(dataset), list[Bar]()
+    for name, (cause, said) in _CAUSES.items():
+        if name in dataset:
+            source = str(dataset[name].attrs.get("comment", "")) if name != "force_error" else ""
+            subject = _within(dataset) if name == SPREAD else source.partition(" from ")[0]
+            found.append(Bar(cause, _largest(dataset, name), said.format(subject), source))
+    return found
+
+
+def next_step(found: Sequence[Bar]) -> str:
+    """Say what makes the largest of several bars smaller; "" if fewer than two are known."""
+    known = [one for one in found if isfinite(one.share)]
+    largest = max(known, key=lambda one: one.share, default=None)
+    return f"The {largest.cause} {largest.said}." if largest and len(known) > 1 else ""
+
+
 def unknowns(dataset: xr.Dataset) -> str:
-    """Compare the mesh's error with what is not known of the tissue and of the image, if that is given."""
-    return " ".join(filter(None, (tissue(dataset), spread(dataset), image(dataset), next_measurement(dataset))))
+    """Write the error bars of F beside that of the mesh, and what to do next; "" if there are none."""
+    return written(bars(dataset))
 
 
-def tissue(dataset: xr.Dataset) -> str:
-    """Say how the mesh's error compares with what is not known of the tissue; "" if its material was not identified."""
-    return _compared(dataset, NAME, "tissue", "The bars of the tissue's parameters are not computed: run the study.")
-
-
-def spread(dataset: xr.Dataset) -> str:
-    """Say how the mesh's error compares with the tissue's spread from place to place; "" if it has none."""
-    return _compared(dataset, SPREAD, "spread of the tissue", "The bars of the tissue's spread are not computed.")
-
-
-def next_measurement(dataset: xr.Dataset) -> str:
-    """Say which bar is the largest, of several with a spread among them, and what makes it smaller."""
-    if SPREAD not in dataset or not np.isfinite(dataset[SPREAD]).any():
+def written(found: Sequence[Bar]) -> str:
+    """Write several bars, and what to do next; "" if there are fewer than two."""
+    if len(found) < 2:
         return ""
-    force = abs(dataset["force"])
-    bars = {name: float((abs(dataset[name]) / force).max()) for name in _NEXT if name in dataset}
-    largest = max(bars, key=lambda name: np.nan_to_num(bars[name]))
-    return f"The largest bar is that of {_NEXT[largest]}."
+    parts = (f"{one.cause} {one.size}{one.source and f' ({one.source})'}" for one in found)
+    return f"Error bars of F: {', '.join(parts)}. {next_step(found)}".rstrip()
 
 
-def image(dataset: xr.Dataset) -> str:
-    """Say how the mesh's error compares with what the image leaves open; "" if its boundary has no range."""
-    return _compared(dataset, IMAGE, "image", "What the image leaves open is not computed: run the study.")
+def _largest(dataset: xr.Dataset, name: str) -> float:
+    """Return the largest share of F that a bar is; NaN if none is known."""
+    force, bar = (abs(dataset[one]).values for one in ("force", name))
+    known = np.isfinite(bar) & (force > 0)
+    return float(np.max(bar[known] / force[known])) if known.any() else nan
 
 
-def _compared(dataset: xr.Dataset, name: str, of: str, missing: str) -> str:
-    if name not in dataset:
+def _within(dataset: xr.Dataset) -> str:
+    """Say within which distance of the touch half of F is decided, at most; "" if that is not known."""
+    if "influence_radius" not in dataset:
         return ""
-    force, bar, mesh = (abs(dataset[one]).values for one in ("force", name, "force_error"))
-    known = np.isfinite(bar) & np.isfinite(mesh) & (force > 0) & (bar > 0)
-    if not known.any():
-        return missing
-    share = float(np.max(mesh[known] / bar[known]))
-    what = f"F is ± {percent(float(np.max(bar[known] / force[known])))} by the {of} ({dataset[name].comment})"
-    if share < 1:
-        return f"{what}: the mesh is {percent(share)} of what you do not know."
-    return f"{what}, which is less than the mesh: its error bar is {share:.2g} times as large."
+    radius = 1e3 * float(dataset["influence_radius"].sel(decided=_DECIDED).max())
+    return f" within {radius:.2g} mm of the point of contact, where half of F is decided" if isfinite(radius) else ""

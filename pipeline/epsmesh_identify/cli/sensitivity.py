@@ -60,12 +60,13 @@ def _make(study: "Study", file: Path, store: Path) -> Made:
 
 
 def _dataset(study: "Study", store: Path) -> "xr.Dataset":
-    """Return the indices of the study's outputs; exit if they cannot be had."""
+    """Return the indices of the study's outputs, with its error bars; exit if they cannot be had."""
     from epsmesh_identify.surrogate.cases import stored_in
     from epsmesh_identify.surrogate.sensitivity import dataset_of, explain
 
     with refusing_cases(study, store, _HOWTO):
-        return dataset_of(study, explain(study, stored_in(store)))
+        solve = stored_in(store)
+        return dataset_of(study, explain(study, solve), solve(study))
 
 
 def _as_data(dataset: "xr.Dataset") -> dict[str, object]:

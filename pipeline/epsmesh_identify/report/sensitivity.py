@@ -11,13 +11,19 @@ _ROW = "  {:<24} {:<24} {:>16} {:>16}"
 
 def answer(dataset: xr.Dataset) -> list[str]:
     """Return the lines that tell the indices of all outputs, the parameter that matters most first."""
-    return [line for output in dataset["output"].values for line in _of_output(dataset.sel(output=output))]
+    lines = [line for output in dataset["output"].values for line in _of_output(dataset.sel(output=output))]
+    return [*lines, *_bars(dataset)]
 
 
 def sentences(dataset: xr.Dataset) -> list[str]:
     """Return in a sentence or two for each output which parameter matters most, and how exact that is."""
     outputs = [ordered(dataset.sel(output=output)) for output in dataset["output"].values]
-    return [_concluded(one) for one in outputs]
+    return [*map(_concluded, outputs), *_bars(dataset)]
+
+
+def _bars(dataset: xr.Dataset) -> list[str]:
+    """Return what the error bars of F are, and what to do next."""
+    return [said] if (said := str(dataset.attrs.get("bars", ""))) else []
 
 
 def rows_of(dataset: xr.Dataset) -> list[list[str]]:

@@ -91,8 +91,19 @@ def _elastic(raw: Mapping[str, Any]) -> dict[str, Any]:
     for section, key in (("probe", "history"), ("material", "relaxation")):
         if isinstance(table := found.get(section), dict):
             found[section] = {name: value for name, value in table.items() if name != key}
-    found["solve"] = {**found.get("solve", {}), "exact": False, "timing": False}
+    for section in ("material", "body"):
+        found[section] = _without_spread(found.get(section))
+    found["solve"] = {**found.get("solve", {}), "exact": False, "timing": False, "influence": False}
     return found
+
+
+def _without_spread(table: Any) -> Any:
+    """Return tissues without their random deviations, which do not change F."""
+    if isinstance(table, list):
+        return [_without_spread(one) for one in table]
+    if isinstance(table, dict):
+        return {name: _without_spread(value) for name, value in table.items() if name != "spread"}
+    return table
 
 
 def _sweep(place: Place) -> Place:

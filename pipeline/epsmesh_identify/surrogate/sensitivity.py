@@ -11,6 +11,8 @@ from scipy.special import ndtri
 
 from epsmesh.arrays import FloatArray
 from epsmesh.quantities import QUANTITIES
+from epsmesh.report.influence import OF_NORMAL
+from epsmesh.report.uncertainty import Bar, bars, written
 from epsmesh.study.problems import Problem, StudyError
 from epsmesh.study.sweep import Study
 from epsmesh_identify.sections.identification import Sought
@@ -130,8 +132,8 @@ def _quantiles(one: Sought, share: FloatArray) -> FloatArray:
     return np.asarray(one.low + (one.high - one.low) * share)
 
 
-def dataset_of(study: Study, found: Sequence[Explained]) -> xr.Dataset:
-    """Return the indices of all outputs as a dataset."""
+def dataset_of(study: Study, found: Sequence[Explained], own: xr.Dataset | None = None) -> xr.Dataset:
+    """Return the indices of all outputs as a dataset; with the study's ``own``, what its other error bars are."""
     varied = spread_of(study).varied
     both, of_output = ("output", "parameter"), ("output",)
     values: dict[str, Any] = {
@@ -151,4 +153,13 @@ def dataset_of(study: Study, found: Sequence[Explained]) -> xr.Dataset:
     for name in dataset.variables:
         units = {"units": "1"} if name in _SHARES else {}
         dataset[name].attrs = {"long_name": _WORDS[str(name)]} | units
-    return dataset.assign_attrs(Conventions="CF-1.8", title=study.title, study=study.text)
+    of_force = [_bar(one, names["parameter"]) for one in found if one.output.name == FORCE.name]
+    said = written([*bars(own), *of_force]) if own is not None and of_force else ""
+    return dataset.assign_attrs(Conventions="CF-1.8", title=study.title, study=study.text, bars=said)
+
+
+def _bar(found: Explained, names: Sequence[str]) -> Bar:
+    """Return the error bar of F by the ranges of the parameters: that of a normal distribution as wide."""
+    first = names[int(np.argmax(found.indices.first))]
+    share = OF_NORMAL * found.indices.deviation
+    return Bar("ranges of parameters", share, f"decide: measure {first} more exactly", ", ".join(names))

@@ -12,7 +12,7 @@ from epsmesh.study.read import read_mapping
 from epsmesh.study.toml import to_toml
 from epsmesh_identify.report.sensitivity import answer
 from epsmesh_identify.surrogate.cases import SurrogateError
-from epsmesh_identify.surrogate.sensitivity import dataset_of, explain
+from epsmesh_identify.surrogate.sensitivity import dataset_of, explain, spread_domain
 from epsmesh_identify.surrogate.sobol import _passed_on, sobol
 from tests.identify.surrogate.scenes import BALL, PUNCH, hertz, solved_by
 
@@ -106,6 +106,35 @@ def test_the_dataset_names_what_was_varied():
     assert list(dataset["parameter"].values) == list(VARIED)
     assert float(dataset["high"].sel(parameter="radius")) == pytest.approx(3e-3)
     assert str(dataset["output_unit"].sel(output="force").values) == "N"
+
+
+@pytest.mark.parametrize("is_wide", [True, False])
+def test_its_bar_of_f_is_beside_those_of_the_study(is_wide):
+    varied = VARIED if is_wide else {"young": ["10 kPa", "10.01 kPa"]}
+    study, solve = read_mapping(PUNCH | {"sensitivity": varied}, "punch"), solved_by(_punch)
+    own = solve(read_mapping(PUNCH, "punch"))
+    own["force_error"] = 0.01 * own["force"]
+    dataset = dataset_of(study, explain(study, solve), own)
+    share = 100 * 1.959964 * float(dataset["deviation"].sel(output="force"))
+    said = answer(dataset)[-1]
+    assert f"mesh ± 1 %, ranges of parameters ± {share:.2g} % ({', '.join(varied)})." in said
+    decides = "ranges of parameters decide: measure young more exactly" if is_wide else "mesh decides: refine it"
+    assert f"The {decides}" in said
+
+
+def test_a_spread_of_the_tissue_is_not_solved_for_the_ranges():
+    layer = {"name": "skin", "thickness": "1 mm", "young": "20 kPa", "poisson": 0.4}
+    spread = {"spread": {"young": "30 %", "correlation_length": "5 mm"}}
+    body = PUNCH["body"] | {"layer": [layer | spread]}
+    content = PUNCH | {
+        "body": body,
+        "material": {**PUNCH["material"], **spread},
+        "sensitivity": {"young": ["5 kPa", "20 kPa"]},
+    }
+    domain = spread_domain(read_mapping(content, "punch"))
+    study = domain.study([one.value(np.zeros(1)) for one in domain.ranges], np.array([1e-4]))
+    assert not any(tissue.spread for case in study.cases() for tissue in case.tissues)
+    assert not study.solve.influence
 
 
 def test_the_report_of_its_dataset_has_the_answer_the_figure_and_all_indices(tmp_path, epsmesh):

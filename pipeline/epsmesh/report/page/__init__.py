@@ -26,7 +26,7 @@ from epsmesh.report.page.facts import (
 )
 from epsmesh.report.page.inline import in_page
 from epsmesh.report.study import warnings_of
-from epsmesh.report.uncertainty import unknowns
+from epsmesh.report.uncertainty import bars, next_step
 from epsmesh.report.values import at_peak
 from epsmesh.states import FAILURES, SKIPPED
 
@@ -54,7 +54,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     over_time, dataset = dataset, at_peak(dataset)
     study = str(dataset.attrs.get("study", ""))
     guide = guide_if_any(over_time)
-    table = case_table(dataset)
+    table, known = case_table(dataset), bars(dataset)
     return render_page(
         _TEMPLATES / "page.html.j2",
         joined(*_SCRIPTS),
@@ -71,7 +71,8 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         figures=_figures(over_time),
         guide=guide,
         answer=[guide.sentence] if guide else headline(over_time),
-        tissue=unknowns(dataset),
+        bars=[[one.cause, one.size, one.source] for one in known] if len(known) > 1 else [],
+        next_step=next_step(known),
         table=table,
         many_cases=counted(len(table.order), "case"),
         first_rows=FIRST_ROWS,
