@@ -9,7 +9,7 @@ from epsmesh.shapes.section import in_mm
 # Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
 # the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
 # contact area, and a part of what nodal forces have beyond it. Measured: benchmarks/results/friction.md.
-_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, _OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.3
+_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.3
 
 # Contact radii by which loads may move the place of contact without a word.
 _MOVED = 0.5
@@ -101,4 +101,4 @@ class Rubbing:
         """
         of_slip = (_OF_STEPS * self.change_of_share + area_bar * self.share) * area + _OF_UNSURE * self.unsure
         of_force = _OF_STEPS * self.change_of_force + (_OF_FORCE * relative + _OF_AREA * area_bar) * self.force
-        return of_slip, of_force + _OF_UNEVEN * self.uneven
+        return of_slip, of_force + OF_UNEVEN * self.uneven

@@ -192,15 +192,8 @@ class Candidates:
         return np.asarray(np.sqrt(np.maximum(np.bincount(self.facets.ravel(), shares, len(self)), 0.0) / count))
 
     def size_of(self, forces: FloatArray) -> float:
-        """Return the integral (N) of the size of the traction with nodal ``forces`` (n, d).
-
-        Facets share their nodes' forces by area. Nodal forces alternate beside an edge where the traction is singular:
-        their own sizes add up to as much as three times the integral.
-        """
-        nodes, count = self.facets.ravel(), self.facets.shape[1]
-        around = np.bincount(nodes, np.repeat(self.areas, count), len(self))
-        shares = self.areas[:, None] / around[self.facets]
-        return float(np.linalg.norm(np.einsum("mk,mkd->md", shares, forces[self.facets]), axis=1).sum())
+        """Return the integral (N) of the size of the traction with nodal ``forces`` (n, d); see :func:`size_of`."""
+        return size_of(forces, self.facets, self.areas)
 
     def from_regions(self, values: Sequence[float]) -> FloatArray:
         """Return moduli, ``values`` by region, as values of the nodes (n), from the tissue below their facets."""
@@ -253,6 +246,17 @@ class Candidates:
         found = np.zeros(len(self), dtype=bool)
         found[nodes] = True
         return found
+
+
+def size_of(forces: FloatArray, facets: IntArray, areas: FloatArray) -> float:
+    """Return the integral (N) of the size of the traction with nodal ``forces`` (n, d) on ``facets`` (m, k).
+
+    Facets share their nodes' forces by their ``areas`` (m). Nodal forces alternate beside an edge where the traction is
+    singular: their own sizes add up to as much as three times the integral.
+    """
+    around = np.bincount(facets.ravel(), np.repeat(areas, facets.shape[1]), len(forces))
+    shares = areas[:, None] / around[facets]
+    return float(np.linalg.norm(np.einsum("mk,mkd->md", shares, forces[facets]), axis=1).sum())
 
 
 def find_candidates(body: BodyMesh, space: Any, factors: FloatArray | None = None) -> Candidates:

@@ -35,7 +35,7 @@ class MeridianForms:
         Raises:
             SolveError: if the meshes of two regions do not match.
         """
-        unit = law.parameters[0].lame_mu
+        self.degree, unit = degree, law.parameters[0].lame_mu
         relaxes, self._numbers = any(each.relaxation for each in law.parameters), tuple(meshes)
         parts = [
             Region(*mesh, degree, law.parameters[region], unit, is_plane=is_plane, relaxes=relaxes)

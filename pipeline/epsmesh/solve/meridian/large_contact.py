@@ -24,7 +24,7 @@ from epsmesh.mesh.meridian import Grading
 from epsmesh.solve.contact.checks import check_support
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.contact.in_time import ContactIndentation
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import OF_UNEVEN, ContactResult
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.large import LargeSolver, stopped
 from epsmesh.solve.meridian.problem import Answer
@@ -118,6 +118,7 @@ class LargeMeridianContact(LargeSolver):
             return found
         # Too few steps make friction too large, which then errs by more than by its share of itself.
         of_friction /= 1 - min(of_friction / max(friction, of_friction), _MOST) if of_friction else 1.0
+        of_friction += OF_UNEVEN * fine.uneven * fine.unit**2
         # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
         of_slip += fine.slip_resolution * fine.unit**2 + fine.resolution * area
         return replace(

@@ -28,7 +28,7 @@ from epsmesh.solve.contact.contact_steps import (
     reach_contact_with_friction,
 )
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
-from epsmesh.solve.contact.surface import Neighbours
+from epsmesh.solve.contact.surface import Neighbours, size_of
 from epsmesh.solve.meridian.forms import Meshes
 from epsmesh.solve.meridian.punch import RoundTool
 from epsmesh.solve.meridian.signs import seen_from_above
@@ -222,7 +222,12 @@ class MeridianTouch:
     @property
     def edge(self) -> float:
         """The radius at rest at which contact ends."""
-        return sum(self._outermost) / 2
+        return min(sum(self._outermost) / 2, self._end)
+
+    @property
+    def _end(self) -> float:
+        """The radius at rest of the tissue below the tool's own end; at large displacements it is not known."""
+        return self.tool.limit / self.unit if self.law.is_linear else inf
 
     @property
     def resolution(self) -> float:
@@ -250,7 +255,7 @@ class MeridianTouch:
         inner, outer, beside = radii.take([last, last + 1, last + 2], mode="clip")
         near, far = np.maximum(touched.gap.take([last + 1, last + 2], mode="clip"), 0.0) ** (2 / 3)
         edge = outer - (beside - outer) * near / (far - near) if far > near else outer
-        beyond = max(edge, inner) ** 2 - ((inner + outer) / 2) ** 2
+        beyond = min(max(edge, inner), self._end) ** 2 - ((inner + outer) / 2) ** 2
         return float(self.areas[touched.active].sum() + pi * beyond)
 
     @property
@@ -276,10 +281,19 @@ class MeridianTouch:
         """F and the friction in units of μ times m², the contact area and the part that slides in m²: (4,)."""
         return self.unit**2 * np.array([self.force, self.friction, self.area, self.slip_area])
 
-    @property
+    @cached_property
     def friction(self) -> float:
-        """The sum of the sizes of the tangential forces."""
-        return 2 * pi * float(np.linalg.norm(self._contact.friction, axis=1).sum())
+        """The integral of the size of the tangential traction."""
+        degree, radii = self.tissue.system.forms.degree, self._radii
+        starts = np.arange(0, len(radii) - degree, degree)
+        facets = starts[:, None] + np.arange(degree + 1)
+        areas = pi * (radii[starts + degree] ** 2 - radii[starts] ** 2)
+        return 2 * pi * size_of(self._contact.friction, facets, areas)
+
+    @property
+    def uneven(self) -> float:
+        """What the sizes of nodal forces have beyond that."""
+        return 2 * pi * float(np.linalg.norm(self._contact.friction, axis=1).sum()) - self.friction
 
     def check(self) -> None:
         """Check balance and work, and that contact ends on the surface.
