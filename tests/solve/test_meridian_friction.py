@@ -81,7 +81,7 @@ def test_a_disc_that_sticks_is_bonded():
 
 
 def test_friction_below_a_sharp_disc_is_the_integral_of_the_size_of_the_traction():
-    """Nodal forces alternate beside its edge, where the traction is singular; the value is that of a mesh 25 times finer there."""
+    """Nodal forces alternate beside its edge, where the traction is singular. The value is that of a far finer mesh."""
     found = pressed(FLAT, 0.1, law(0.45, "linear"), 0.3).contact
     assert found.friction_force == pytest.approx(0.012014, abs=found.friction_force_bar)
     assert found.friction_force_bar < 0.03 * found.friction_force
