@@ -89,18 +89,19 @@ def test_a_disk_that_fills_while_results_are_written_loses_no_record(epsmesh, tm
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A folder with a study that was run: small.toml, out/small.nc and out/cases.sqlite."""
-    folder = tmp_path_factory.mktemp("run")
-    file = folder / "small.toml"
-    file.write_text(small_text(mesh={"epsilon": "full"}, solve={"exact": False}), encoding="utf-8")
-    done = epsmesh_here("run", file, "--output", folder / "out", "--meshes", folder / "meshes")
+    """A folder with two studies that were run: small.toml, out/small.nc and out/cases.sqlite; swept.toml likewise."""
+    folder, options = tmp_path_factory.mktemp("run"), {"mesh": {"epsilon": "full"}, "solve": {"exact": False}}
+    files = [folder / "small.toml", folder / "swept.toml"]
+    for file, depth in zip(files, ("0.1 mm", ["0.1 mm", "0.2 mm"]), strict=True):
+        file.write_text(small_text(**options, probe={"depth": depth}), encoding="utf-8")
+    done = epsmesh_here("run", *files, "--output", folder / "out", "--meshes", folder / "meshes")
     assert done.exit_code == 0, done.output
     return folder
 
 
 # What stands in the way of which command, of those that write other files than `run` does.
 COMMANDS = {
-    "figures": ("out/small.svg", ("report", "out/small.nc", "--figures")),
+    "figures": ("out/swept.svg", ("report", "out/swept.nc", "--figures")),
     "report": ("out/small.html", ("report", "out/small.nc")),
     "report of a scene": ("out/small.html", ("report", "out/small.nc", "--scene", "0")),
     "view as a page": ("more/small_0.html", ("view", "small.toml", "0", "--export", "html", "--output", "more")),

@@ -15,6 +15,7 @@ from epsmesh.insertion.paths import complete, lacking, possible
 from epsmesh.insertion.steps import PHASES
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
+from epsmesh.report.figures import figure
 from epsmesh.report.figures.insertion import insertion
 from epsmesh.report.guide import guide
 from epsmesh.run.stop import reason_to_skip, waves
@@ -278,11 +279,15 @@ def test_the_guide_answers_for_puncture_and_cutting():
     mesh = {"accuracy": "10 %", "epsilon": ["5 mm", "10 mm", "full"], "outside": "free"}
     dataset = _path(read_mapping(SCENE | {"mesh": mesh}, "sweep"))
     shift = xr.DataArray([1.3, 1.02, 1.0], dims="epsilon")
-    found = guide(dataset.assign(puncture_depth=dataset["puncture_depth"] * shift), "5 %")
+    dataset = dataset.assign(puncture_depth=dataset["puncture_depth"] * shift)
+    found = guide(dataset, "5 %")
     assert found.answer.labels["epsilon"] == pytest.approx(10e-3)
     smallest = {part.where["quantity"]: part.answers[0].epsilon for part in found.parts}
     assert smallest == {("depth of the puncture",): 10e-3, ("force of the puncture",): 5e-3, ("last force",): 5e-3}
     assert "puncture and cutting are within 2 % of the full order" in found.sentence
+    drawn = figure(dataset, "ratio").axes[0]  # no force, and not all of F/F_max
+    assert drawn.get_ylabel() == "share of the full order's"
+    assert drawn.get_legend_handles_labels()[1] == ["force of the puncture", "depth of the puncture", "last force"]
 
 
 def test_tools_with_different_depths_are_refused():

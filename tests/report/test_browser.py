@@ -14,6 +14,7 @@ pytestmark = [
     pytest.mark.skipif(CHROMIUM is None and not os.environ.get("CI"), reason="chromium is not installed"),
 ]
 NASTY = "a < b & <script>c</script>"
+RELAXATION = [{"share": 0.4, "time": "2 s"}]
 CELLS = "[...document.querySelectorAll('#table tbody tr')].map(r => [...r.cells].map(c => c.textContent))"
 HEADS = "[...document.querySelectorAll('#table thead th')].map(h => h.dataset.name)"
 SORTED = (
@@ -174,6 +175,19 @@ def test_fits_the_screen_with_enough_contrast(browser, path, width, dark):
     assert len(found) >= 6
     for colour in found:
         assert contrast(luminance(colour), ground) >= 3, colour
+    browser.look_like(1280, 900)
+
+
+@pytest.mark.parametrize("along", ["time", "young"])
+def test_a_figure_of_one_column_fits_a_phone_and_can_be_read(browser, tmp_path, along):
+    if along == "time":
+        probe, material = {"history": {"ramp": ["1 s", "3 s"], "hold": "5 s"}}, {"relaxation": RELAXATION}
+    else:
+        probe, material = {}, {"young": ["5 kPa", "10 kPa"]}
+    browser.look_like(380, 800)
+    browser.open(write_page(dataset(probe=probe, material=material), tmp_path / "a.html"))
+    assert browser.ask(NARROW)
+    assert min(browser.ask(LETTERS)) > 8.9
     browser.look_like(1280, 900)
 
 

@@ -11,6 +11,7 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build, write
 from epsmesh.report.read import read
 from epsmesh.report.study import study_of
+from epsmesh.study.axis import Axis
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import read_study
 from tests.cases import raw
@@ -134,3 +135,8 @@ def test_every_entry_of_a_stiffness_has_its_unit(tmp_path):
         expected = unit[one] if one == other else "N"
         assert str(data["stiffness"].sel(movement=one, reaction=other)["stiffness_unit"].values) == expected
         assert data.epsmesh.to_frame().attrs["units"][f"stiffness_{one}_{other}"] == expected
+
+
+def test_a_swept_key_that_no_table_names_is_named_in_words():
+    axes = (Axis("material", "direction", ("a", "b"), "", piece="fibres"), Axis("load", "push_in", (1, 2), "1", "pads"))
+    assert [axis.words for axis in axes] == ["direction of the fibres", "push in of the pads"]

@@ -31,10 +31,7 @@ SMALLER = FIGURE | {"solve": EXACT, "material": {"poisson": [0.3, 0.4]}, "mesh":
 # name: study, its main figure, the others
 STUDIES = {
     "with F_exact": (SMALLER, "ratio", {"error", "force", "compliance"}),
-    "one case": ({}, "force", set()),
-    "one value": ({"mesh": {"epsilon": ["6 mm"]}}, "force", set()),
     "no full order": ({"mesh": {"epsilon": EPSILONS[:-1]}}, "force", set()),
-    "only full order": ({"mesh": {"epsilon": ["full"]}}, "force", set()),
     "no epsilon": ({"material": {"poisson": [0.1, 0.2, 0.3]}}, "force", set()),
     "words only": ({"mesh": {"outside": ["coarse", "free"], "epsilon": "8 mm"}}, "force", set()),
     "sizes": (SIZES, "error", {"force"}),
@@ -53,6 +50,12 @@ def test_every_study_gets_the_figures_that_suit_it(tmp_path, name):
         paths = draw(data, tmp_path / "a", ["svg"], kinds)
     assert [path.name for path in paths] == ["a.svg", *(f"a_{kind}.svg" for kind in kinds[1:])]
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
+
+
+@pytest.mark.parametrize("mesh", [{}, {"epsilon": ["6 mm"]}, {"epsilon": ["full"]}])
+def test_the_force_of_one_case_is_a_number_and_no_figure(tmp_path, mesh):
+    data = dataset(mesh=mesh)
+    assert choose(data) == draw(data, tmp_path / "a") == []
 
 
 def test_the_curves_of_the_main_figure_are_the_numbers_of_the_dataset():
@@ -173,10 +176,10 @@ def test_no_line_goes_over_a_case_without_a_force(kind):
     assert all(np.isnan(line.get_ydata()[2]) for line in curves)
 
 
-@pytest.mark.parametrize("kind", sorted({*KINDS} - {"force"}))
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
     assert lacks(dataset(), kind).startswith("needs ")
-    assert lacks(dataset(), "force") == ""
+    assert lacks(dataset(**SMALLER), "force") == ""
 
 
 @pytest.mark.nightly

@@ -289,7 +289,7 @@ def test_elements_are_told():
     text = str(guide(dataset(TEXT + 'rim = "0.1 mm"\n'), "5%"))
     assert "2 mm within ε, 8 mm far away, 0.1 mm at the probe's edge, growth 0.5, degree 2, element auto" in text
     assert "up to 40,000 unknowns, 4,000 elements, 40 ms" in text
-    assert "F = 13.26 mN ± 0.4 %, F_exact = 13 mN ± 0.1 %, at ν = 0.3, needle" in text
+    assert "F = 13.260 ± 0.053 mN, F_exact = 13.000 ± 0.013 mN, at ν = 0.3, needle" in text
 
 
 def test_json_and_rows_hold_the_same(tmp_path):

@@ -4,7 +4,7 @@ from math import nan
 
 import pytest
 
-from epsmesh.report.words import span, without_shared
+from epsmesh.report.words import barred, span, without_shared
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,21 @@ def test_words_that_all_names_share_are_left_out(names, short):
 )
 def test_both_ends_of_a_range_have_as_many_decimals(values, words):
     assert span("force", values) == words
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "words"),
+    [
+        (31.0046, 0.2512, "31.00 ± 0.25 mN"),
+        (13.0, 0.0996, "13.00 ± 0.10 mN"),
+        (-0.4, 0.03, "-0.400 ± 0.030 mN"),
+        (12345.6, 230.0, "12346 ± 230 mN"),
+        (0.3, 120.0, "0 ± 120 mN"),
+        (0.0, 0.012, "0.000 ± 0.012 mN"),
+        (1.5, 1e-12, "1.500000 ± 0.000001 mN"),
+        (1.23456, 0.0, "1.235 ± 0 mN"),
+        (1.23456, nan, "1.235 mN"),
+    ],
+)
+def test_a_value_and_its_bar_end_at_one_decimal_place(value, bar, words):
+    assert barred(value, bar, "mN") == words

@@ -123,7 +123,8 @@ def _draw(path: Path, dataset: "xr.Dataset", kind: list[str] | None, *, rest: bo
     stem, kinds = path.with_suffix(""), kind or choose(dataset)
     check_output(*(picture for some in files(dataset, stem, kinds=kinds).values() for picture in some))
     pictures = [str(picture) for picture in draw(dataset, stem, kinds=kinds, rest=rest)]
-    say({"file": str(path), "files": pictures}, *pictures)
+    none = f"{path}: one case has no figure: epsmesh view shows it"
+    say({"file": str(path), "files": pictures}, *(pictures or [none]))
 
 
 def _scene_of(path: Path, dataset: "xr.Dataset", text: str) -> str:

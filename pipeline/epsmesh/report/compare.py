@@ -19,6 +19,7 @@ from epsmesh.quantities import quantity_of, write
 from epsmesh.report.parameters import Parameters, differing, parameters_of, units_of, varied
 from epsmesh.report.study import DatasetError, study_of
 from epsmesh.report.values import at_peak
+from epsmesh.report.words import barred
 from epsmesh.states import OK, PENDING, SKIPPED
 
 # Forces that agree to this share of them agree, whatever their bars: the tolerance of solvers.
@@ -175,7 +176,7 @@ def _between(a: xr.Dataset, b: xr.Dataset) -> str:
     if not all(map(isfinite, (one, other, bar, other_bar))):
         return ""
     return (
-        f". F is {one:.5g} mN in A, {other:.5g} mN in B: B less A is {other - one:.4g} ± {bar + other_bar:.2g} mN, "
+        f". F is {one:.5g} mN in A, {other:.5g} mN in B: B less A is {barred(other - one, bar + other_bar, 'mN')}, "
         "with both error bars"
     )
 

@@ -337,7 +337,7 @@ def _origin(plan: Plan, key: str, record: Record | None) -> str:
 
 def _coordinate(axis: Axis) -> Any:
     known = quantity_of(axis.name)
-    texts = {"long_name": known.meaning if known else f"{axis.path} of the study file"}
+    texts = {"long_name": known.meaning if known else axis.words}
     if axis.unit and not isinstance(axis.labels[0], str):  # labels in words have their units in them
         texts["units"] = axis.unit
     values = np.array(axis.labels, dtype=object if isinstance(axis.labels[0], str) else None)

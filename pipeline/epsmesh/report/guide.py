@@ -10,7 +10,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from epsmesh.report.study import DatasetError, Labels
 from epsmesh.report.times import doubts
 from epsmesh.report.uncertainty import unknowns
 from epsmesh.report.verdicts import EXACT, Cells, Verdict, arrange, by_outside, choose, is_full, keeps, most_accurate
-from epsmesh.report.words import choices, percent
+from epsmesh.report.words import barred, choices, percent
 from epsmesh.units import parse_quantity
 
 # The accuracy that the report asks for, and who gives neither accuracy nor budget.
@@ -144,11 +144,10 @@ class Guide:
         where = f", at {choices(self.coordinates, verdict.limit)}" if verdict.limit else ""
         own = verdict.exact / verdict.force  # from a share of F_exact to one of F
         known = self.reference == EXACT
-        bars = (f" ± {percent(own * bar)}" if known else "" for bar in (verdict.force_bar, verdict.exact_bar))
+        bars = (own * bar if known else nan for bar in (verdict.force_bar, verdict.exact_bar))
         unit = "mm" if "depth" in str((verdict.limit or {}).get("quantity", "")) else "mN"
-        force, exact = (
-            f"{1e3 * value:.4g} {unit}{bar}" for value, bar in zip((verdict.force, verdict.exact), bars, strict=True)
-        )
+        values = (1e3 * value for value in (verdict.force, verdict.exact))
+        force, exact = (barred(value, abs(value) * bar, unit) for value, bar in zip(values, bars, strict=True))
         is_of_paths = self._is_of_paths
         found = f"{force}, {self._compared} {exact}" if is_of_paths else f"F = {force}, {self.reference} = {exact}"
         return [

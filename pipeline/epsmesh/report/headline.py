@@ -9,7 +9,7 @@ from epsmesh.quantities import write
 from epsmesh.report.insertion import answer
 from epsmesh.report.study import study_of
 from epsmesh.report.values import answer_of, at_peak, has_path, relative
-from epsmesh.report.words import span
+from epsmesh.report.words import barred, scale, span
 
 # Share of the largest depth by which the last one may be smaller of a tool that is held.
 _HELD = 1e-9
@@ -34,9 +34,9 @@ def _of_forces(dataset: xr.Dataset) -> str:
     known, bar = int(np.isfinite(dataset["force"]).sum()), _largest_bar(dataset, name)
     what, values = "F" if name == "force" else "The depth at the given force", span(name, dataset[name])
     if size == 1:
-        return f"{what} = {values}{bar and f' ± {bar}'}{_depth(dataset)}."
+        return f"{what} = {_one(dataset, name)}{_depth(dataset)}."
     if known == 1:
-        return f"One of {size} cases has a force, {values}{bar and f' ± {bar}'}."
+        return f"One of {size} cases has a force, {_one(dataset, name)}."
     which = "" if known == size else f"{known} of {size} cases have a force. "
     return f"{which}{what} is {values}{_place(dataset)}{bar and f'; the largest error bar is {bar}'}."
 
@@ -50,7 +50,7 @@ def _of_histories(dataset: xr.Dataset) -> str:
     if last.size == 1:
         own = dataset["force"].squeeze().dropna("time")
         first, end = (write("time", float(time)) for time in (own["time"][int(abs(own).argmax())], own["time"][-1]))
-        return f"F = {force}{bar and f' ± {bar}'} at its peak, at {first}; it {ends} {span('force', last)} at {end}."
+        return f"F = {_one(peak, 'force')} at its peak, at {first}; it {ends} {span('force', last)} at {end}."
     least, most = (f"{100 * end(last / peak['force']):.3g}" for end in (np.nanmin, np.nanmax))
     shares = least if least == most else f"{least} to {most}"
     return f"F is {force} at its peak and {ends} {shares} % of that{bar and f'; the largest error bar is {bar}'}."
@@ -98,6 +98,14 @@ def _depth(dataset: xr.Dataset) -> str:
     if study is None or answer_of(dataset) == "depth":
         return ""
     return f" at a depth of {span('depth', next(iter(study.cases())).probe.depth)}"
+
+
+def _one(dataset: xr.Dataset, name: str) -> str:
+    """Write the one value that is known, with its error bar and that as a share."""
+    factor, unit = scale(dataset[name])
+    value, bar = (factor * float(dataset[part].max()) for part in (name, f"{name}_error"))
+    share = _largest_bar(dataset, name)
+    return f"{barred(value, bar, unit)}{share and f' ({share})'}"
 
 
 def _largest_bar(dataset: xr.Dataset, name: str) -> str:

@@ -8,6 +8,7 @@ import xarray as xr
 from epsmesh.insertion.steps import INDENTATION, PHASES
 from epsmesh.quantities import write
 from epsmesh.report.values import punctures
+from epsmesh.report.words import barred
 
 
 def answer(dataset: xr.Dataset) -> Iterator[str]:
@@ -35,7 +36,7 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
             1e3 * float(one[f"puncture_{name}{end}"]) for name in ("depth", "force") for end in ("", "_error")
         )
         where = f" of layer {number}" if number > 1 else ""
-        yield f"puncture{where} at {depth:.4g} ± {bar:.2g} mm, F = {force:.4g} ± {of_force:.2g} mN"
+        yield f"puncture{where} at {barred(depth, bar, 'mm')}, F = {barred(force, of_force, 'mN')}"
     if not pierced.sizes["puncture"]:
         yield f"the tissue stays whole down to {write('depth', float(last['depth']))}: F is {_last(last)}"
     elif PHASES[int(last["phase"])] == INDENTATION:
@@ -62,4 +63,4 @@ def _last(step: xr.Dataset) -> str:
 
 
 def _force(step: xr.Dataset) -> str:
-    return f"{1e3 * float(step['force']):.4g} ± {1e3 * float(step['force_error']):.2g} mN"
+    return barred(1e3 * float(step["force"]), 1e3 * float(step["force_error"]), "mN")

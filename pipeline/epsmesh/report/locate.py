@@ -8,6 +8,7 @@ import xarray as xr
 
 from epsmesh.report.study import DatasetError
 from epsmesh.report.values import at_peak, by_case, relative
+from epsmesh.report.words import barred
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,10 +51,10 @@ class Located:
         return ax
 
     def __str__(self) -> str:
-        x, y, z = (f"{1e3 * c:.1f} ± {1e3 * e:.1f}" for c, e in zip(self.point, self.error, strict=True))
+        x, y, z = (barred(1e3 * c, 1e3 * e, "mm") for c, e in zip(self.point, self.error, strict=True))
         axis = ", ".join(f"{c:.2f}" for c in self.axis)
         edge = "; the excess reaches the edge of what was mapped" if self.reaches_edge else ""
-        return f"below x = {x} mm, y = {y} mm, z = {z} mm, along ({axis}){edge}"
+        return f"below x = {x}, y = {y}, z = {z}, along ({axis}){edge}"
 
 
 def locate(dataset: xr.Dataset, body: str, healthy: str) -> Located:

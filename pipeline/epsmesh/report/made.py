@@ -44,19 +44,20 @@ def inputs_of(plan: Plan, records: Mapping[str, Record]) -> str:
     return found.hexdigest()
 
 
-def are_made(files: Sequence[Path], inputs: str) -> bool:
-    """Return whether all ``files`` are there as they were written from these ``inputs``."""
+def made_from(inputs: str, dataset: Path) -> tuple[Path, ...]:
+    """Return the files, the ``dataset`` first, that these ``inputs`` gave; none if one is not as it was written."""
     try:
-        known = json.loads(_note(files).read_bytes())
-        return bool(known == _content(files, inputs))
-    except (OSError, ValueError):
-        return False
+        known = json.loads(_note(dataset).read_bytes())
+        files = tuple(dataset.with_name(name) for name in known if name != "inputs")
+        return files if known == _content(files, inputs) else ()
+    except (OSError, TypeError, ValueError):
+        return ()
 
 
 def note_made(files: Sequence[Path], inputs: str) -> None:
     """Note from which ``inputs`` the ``files`` were made; if that cannot be written, they are made again next time."""
     with suppress(OSError):
-        write_whole(_note(files), json.dumps(_content(files, inputs)))
+        write_whole(_note(files[0]), json.dumps(_content(files, inputs)))
 
 
 @cache
@@ -72,8 +73,8 @@ def _content(files: Iterable[Path], inputs: str) -> dict[str, str]:
     return {"inputs": inputs} | {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 
-def _note(files: Sequence[Path]) -> Path:
-    return files[0].with_name(f".{files[0].name}.made")
+def _note(dataset: Path) -> Path:
+    return dataset.with_name(f".{dataset.name}.made")
 
 
 def _version(library: str) -> str:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from epsmesh.files import result_files
 from epsmesh.launcher import is_interrupt
 from epsmesh.plan.plan import Plan
-from epsmesh.report.made import are_made, inputs_of, note_made
+from epsmesh.report.made import inputs_of, made_from, note_made
 from epsmesh.run.given_force import with_depths
 from epsmesh.run.record import Record
 
@@ -40,31 +40,32 @@ class Results(NamedTuple):
 
 
 def publish(plan: Plan, records: Mapping[str, Record], attributes: Mapping[str, str], output: Path) -> Results:
-    """Write ``<study>.nc`` and its figure into ``output`` and return the files; ``attributes`` tell of the run.
+    """Write ``<study>.nc`` and its figure, if it has one, into ``output``; return the files.
 
-    Files that the same inputs gave stay as they are, with the attributes of the run that wrote them.
+    ``attributes`` tell of the run. Files that the same inputs gave stay as they are, with the attributes of the run
+    that wrote them.
 
     Raises:
         ResultsError: whatever keeps them from being made.
     """
     what = f"{output}: the results of {plan.study.file} cannot be"
-    files = result_files(output, plan.study.name)
+    file = result_files(output, plan.study.name)[0]
     try:
         plan = with_depths(plan, records)
         inputs = inputs_of(plan, records)
-        if are_made(files, inputs):
-            return Results(unchanged=tuple(files))
+        if files := made_from(inputs, file):
+            return Results(unchanged=files)
         from epsmesh.report.dataset import build, write  # noqa: PLC0415 (xarray is slow to load, and no shard needs it)
         from epsmesh.report.read import check_kind  # noqa: PLC0415
 
-        check_kind(files[0])
+        check_kind(file)
         dataset = build(plan, records, attributes)
-        write(dataset, files[0])
+        write(dataset, file)
         from epsmesh.report.figures import draw  # noqa: PLC0415 (matplotlib is slow to load, and wanted last)
 
-        draw(dataset, files[0].with_suffix(""))
+        files = (file, *draw(dataset, file.with_suffix("")))
         note_made(files, inputs)
-        return Results(tuple(files))
+        return Results(files)
     except (OSError, RuntimeError) as error:  # of a full disk HDF5 tells the latter
         raise ResultsError(f"{what} written: {error}; all forces are on record", is_unwritable=True) from error
     except Exception as error:

@@ -13,6 +13,9 @@ from epsmesh import quantities
 
 _NOUGHT = 1e-9  # what rounding leaves of no error
 _SPAN, _APART = 4, 0.01  # digits of the larger end of a range, and a share of it below which the other has its own
+_OF_BAR, _MOST = 2, 7  # digits of an error bar, and of a value at most
+# Their values are names of their own, and need not be said what they are.
+_NAMES = ("probe", "body", "quantity")
 _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 # Of sizes and semi-axes, the last word of their dimensions' names.
 _SIZES = ("size", "axes")
@@ -33,7 +36,7 @@ def number(array: xr.DataArray, value: Any) -> str:
 def choice(coordinate: xr.DataArray, value: Any) -> str:
     """Write a choice along a dimension: ``ν = 0.45``, ``ε = full``, ``outside free``, or a table's own name."""
     if isinstance(value, str):
-        return value if coordinate.name in ("probe", "body") else f"{symbol(coordinate)} {lengths(coordinate, value)}"
+        return value if coordinate.name in _NAMES else f"{symbol(coordinate)} {lengths(coordinate, value)}"
     return f"{symbol(coordinate)} = {re.sub(r'^-', '−', number(coordinate, value))}"
 
 
@@ -44,6 +47,23 @@ def percent(share: float) -> str:
     if abs(share) < _NOUGHT:
         return "0 %"
     return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"
+
+
+def barred(value: float, bar: float, unit: str = "") -> str:
+    """Write a value and its error bar to one decimal place, the bar's second digit: ``31.00 ± 0.25 mN``.
+
+    A value has seven digits at most; what its bar is less than, the bar has of the last. Without a bar it has four.
+    """
+    if not bar > 0:
+        return f"{value:.{_SPAN}g}{' ± 0' if bar == 0 else ''} {unit}".rstrip()
+    decimals, most = (digits - 1 - _power(number) for digits, number in ((_OF_BAR, bar), (_MOST, value or bar)))
+    decimals = max(0, min(decimals, most))
+    return f"{value:.{decimals}f} ± {max(bar, 10.0**-decimals):.{decimals}f} {unit}".rstrip()
+
+
+def _power(number: float) -> int:
+    """Return the power of ten of the first digit, once rounded."""
+    return floor(log10(float(f"{abs(number):.{_OF_BAR - 1}e}")))
 
 
 def span(name: str, values: Any, unit: str | None = None) -> str:

@@ -48,6 +48,12 @@ class Axis:
             return "probe.path" if self.key == "path" else f"probe.path.raster.{self.key}"
         return ".".join(part for part in (self.section, self.piece, self.key) if part)
 
+    @property
+    def words(self) -> str:
+        """Its place in the study file in words: ``direction of the fibres``."""
+        table = self.piece.rpartition(".")[2].partition("[")[0] or self.section
+        return f"{self.key} of {self.owner or f'the {table}'}".replace("_", " ") if self.key else self.section
+
     def write(self, label: float | int | str) -> str:
         """Write one of its labels as people read it."""
         return write(self.name, label, self.unit)

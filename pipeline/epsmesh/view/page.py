@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from epsmesh.files import write_whole
 from epsmesh.pages import compressed, hash_of, joined, json_in_page, layout, packed, render_page
-from epsmesh.quantities import write
+from epsmesh.quantities import readable
+from epsmesh.report.words import barred
 from epsmesh.view import palette
 from epsmesh.view.fields import Fields
 from epsmesh.view.numbers import colours_of, mesh_arrays, shift_unit
@@ -72,9 +73,10 @@ def _facts(fields: Fields) -> list[str]:
     facts = [case] if fields.case.axes else []
     of = "elastic " if fields.case.probe.history else ""
     if not isnan(fields.force):
-        bar = "" if isnan(fields.force_error) else f" ± {100 * fields.force_error:.2g} %"
         where = ", on the meridian" if fields.on_meridian else ""
-        facts.append(f"{of}F = {write('force', float(f'{fields.force:.4g}'))}{bar}{where}")
+        factor, unit = readable("force")
+        force = barred(factor * fields.force, factor * abs(fields.force) * fields.force_error, unit)
+        facts.append(f"{of}F = {force}{where}")
     return [*facts, f"{count}, {fields.dofs:,} unknowns" if fields.dofs else count]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.files import atomic, write_whole
 from epsmesh.pages import render_text
+from epsmesh.report.words import barred
 from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.view.fields import Fields
 
@@ -41,6 +42,7 @@ def write_sofa(fields: Fields, stem: Path, title: str, version: str) -> list[Pat
         name=stem.name,
         force=fields.force,
         bar=fields.force_error,
+        found=barred(fields.force, abs(fields.force) * fields.force_error, "N"),
         degree=fields.case.mesh.degree,
         depth=fields.case.probe.depth,
         axis=[float(part) for part in fields.case.frame.axes[2]],

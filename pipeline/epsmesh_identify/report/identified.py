@@ -10,7 +10,7 @@ import xarray as xr
 
 from epsmesh.printable import counted
 from epsmesh.quantities import quantity_of
-from epsmesh.report.words import percent
+from epsmesh.report.words import barred, percent
 from epsmesh.states import FAILED
 from epsmesh.study.identified import FITS, is_of_test
 from epsmesh.study.text import toml_of
@@ -106,7 +106,7 @@ def of_unknown(dataset: xr.Dataset, name: str, *, is_short: bool = False) -> str
     if not bool(one["seen"]):
         ends = span(dataset, name, float(one["low"]), float(one["high"]))
         return f"{what} is not in {_curves(dataset)}: all values from {ends} fit."
-    value = f"{what} = {written(dataset, name, float(one['estimate']))}"
+    value = f"{what} = {estimated(dataset, name)}"
     first, second = bar(dataset, name), bar(dataset, name, hidden=True)
     first = first if first.startswith("±") else f"({first})"
     if not second or second == first or not if_undeclared(dataset):
@@ -128,6 +128,26 @@ def words_of_undeclared(may_hide: Sequence[str]) -> str:
     return f"if an undeclared {words} cannot be excluded" if words else ""
 
 
+def estimated(dataset: xr.Dataset, name: str) -> str:
+    """Write the value of an unknown: to the decimal place of its first error bar, where that is a number."""
+    value, low, high = _ends(dataset, name, hidden=False)
+    if isfinite(low) and isfinite(high) and bool(dataset["seen"].sel(unknown=name)) and _is_number(name, value):
+        return _in_numbers(dataset, name, (high - low) / 2)[0]
+    return written(dataset, name, value)
+
+
+def _in_numbers(dataset: xr.Dataset, name: str, half: float) -> tuple[str, str]:
+    """Write the value of an unknown and half its interval in one unit, to one decimal place."""
+    value = float(dataset["estimate"].sel(unknown=name))
+    factor, unit = readable(max(abs(value), half), str(dataset["unit"].sel(unknown=name).values))
+    first, last = barred(factor * value, factor * half, unit).split(" ± ")
+    return f"{first} {unit}".rstrip(), f"± {last}"
+
+
+def _is_number(name: str, value: float) -> bool:
+    return _is_absolute(name) or value == 0
+
+
 def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
     """Write the error bar of an unknown: ``± 5 %``, or its ends where they are not even; "" for none."""
     value, low, high = _ends(dataset, name, hidden=hidden)
@@ -136,8 +156,8 @@ def bar(dataset: xr.Dataset, name: str, *, hidden: bool = False) -> str:
     half = (high - low) / 2
     if abs(high + low - 2 * value) > 2 * _UNEVEN * half:
         return span(dataset, name, low, high)
-    if _is_absolute(name) or value == 0:
-        return f"± {written(dataset, name, half, 2)}"
+    if _is_number(name, value):
+        return _in_numbers(dataset, name, half)[1]
     return f"± {percent(half / abs(value))}"
 
 
@@ -199,6 +219,14 @@ def engineering(value: float, unit: str, digits: int = 3) -> str:
     if "e" in scaled:
         scaled = f"{float(scaled):.0f}"
     return f"{scaled} {_PREFIXES[power]}{unit}"
+
+
+def readable(largest: float, unit: str) -> tuple[float, str]:
+    """Return the factor from an SI unit to the one with a prefix that suits the ``largest`` value, and its name."""
+    if unit in ("", "1"):
+        return 1.0, ""
+    number, word = engineering(largest, unit, 12).split(" ")
+    return float(number) / largest if largest else 1.0, word
 
 
 def material(dataset: xr.Dataset) -> str:

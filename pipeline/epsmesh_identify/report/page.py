@@ -15,7 +15,7 @@ from epsmesh.report.page.inline import PAGE_CSS, in_page
 from epsmesh.study.identified import FITS
 from epsmesh_identify.report.figures.identification import identification
 from epsmesh_identify.report.figures.sensitivity import sensitivity
-from epsmesh_identify.report.identified import answer, bar, if_undeclared, material, parts, title, wanted, written
+from epsmesh_identify.report.identified import answer, bar, estimated, if_undeclared, material, parts, title, wanted
 from epsmesh_identify.report.sensitivity import rows_of, sentences
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -44,7 +44,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
         figure=_figure(dataset),
         columns=columns,
         rows=rows,
-        is_beside=len(columns) < 6 and len(rows) < 8,
+        is_beside=is_one,
         parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
         material=material(dataset),
         study=str(dataset.attrs.get("study", "")),
@@ -91,7 +91,7 @@ def _of_one(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     names = [*wanted(dataset), *(one for one in map(str, dataset["unknown"].values) if one not in wanted(dataset))]
     rows = []
     for name in names:
-        value = written(dataset, name, float(dataset["estimate"].sel(unknown=name)))
+        value = estimated(dataset, name)
         seen = bool(dataset["seen"].sel(unknown=name))
         unseen = "not in the curves" if name in wanted(dataset) else "as known before"
         bars = [bar(dataset, name), bar(dataset, name, hidden=True)] if seen else [unseen, ""]
@@ -107,7 +107,7 @@ def _of_files(dataset: xr.Dataset) -> tuple[list[str], list[list[str]]]:
         verdict = str(one["verdict"].values) or f"failed: {one['message'].values}"
         cells = [str(file)]
         for name in names:
-            value = written(one, name, float(one["estimate"].sel(unknown=name))) if str(one["verdict"].values) else ""
+            value = estimated(one, name) if str(one["verdict"].values) else ""
             cells += [value, bar(one, name), bar(one, name, hidden=True)] if verdict == FITS else [value, "", ""]
         rows.append([*cells, verdict])
     heads = [head for name in names for head in (title(name), "as declared", "undeclared")]

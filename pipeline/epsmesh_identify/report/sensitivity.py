@@ -1,10 +1,12 @@
 """Sobol's indices of a dataset in words: a table for each output, and which parameter matters most."""
 
 from collections.abc import Iterator
+from math import isfinite
 
 import xarray as xr
 
-from epsmesh.quantities import QUANTITIES, symbol, write
+from epsmesh.quantities import QUANTITIES, readable, symbol, write
+from epsmesh.report.words import barred
 
 _ROW = "  {:<24} {:<24} {:>16} {:>16}"
 
@@ -33,7 +35,7 @@ def rows_of(dataset: xr.Dataset) -> list[list[str]]:
 
 def share(value: float, error: float) -> str:
     """Write a share and its error bar in per cent."""
-    return f"{100 * value:.1f} ± {100 * error:.1f} %"
+    return barred(100 * value, 100 * error, "%")
 
 
 def ordered(one: xr.Dataset) -> xr.Dataset:
@@ -44,9 +46,10 @@ def ordered(one: xr.Dataset) -> xr.Dataset:
 def range_of(one: xr.Dataset) -> str:
     """Write the range of one parameter, or its mean and error, as people read it."""
     name, unit = str(one["parameter"].values), str(one["unit"].values)
-    normal = [write(name, float(one[part]), unit) for part in ("expected", "expected_error")]
-    if all(normal):
-        return " ± ".join(normal)
+    factor, word = readable(name, unit)
+    mean, error = (factor * float(one[part]) for part in ("expected", "expected_error"))
+    if isfinite(mean) and isfinite(error):
+        return barred(mean, error, word)
     return " to ".join(write(name, float(one[end]), unit) for end in ("low", "high"))
 
 

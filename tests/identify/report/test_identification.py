@@ -24,7 +24,7 @@ def test_both_error_bars_are_told_each_with_what_it_supposes():
         "E = 12.0 kPa ± 5 % if the body is as declared; ± 17 % if an undeclared layer, base or stiffening cannot be "
         "excluded."
     )
-    assert second == "ν = 0.4 ± 0.03 as declared; 0.3 to 0.44 with what may be undeclared."
+    assert second == "ν = 0.400 ± 0.030 as declared; 0.3 to 0.44 with what may be undeclared."
 
 
 def test_one_bar_is_told_where_nothing_may_hide():

@@ -50,7 +50,7 @@ _NEEDS = {
     "compliance": "several tools and ε, the full order among them, in scenes whose compliances add",
     "influence": "where F is decided ([solve] influence)",
     "map": "a raster of places ([probe.path])",
-    "force": "a case that has a force",
+    "force": "several cases, and a force",
     "nothing": "that no case has a force",
 }
 _LONG_NAME = 34  # letters of a name that a figure shows
@@ -59,7 +59,10 @@ _NAMED = ("probe", "body")  # their values are names that a study gives
 
 
 def choose(dataset: xr.Dataset) -> list[str]:
-    """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits."""
+    """Return the kinds of figures that suit ``dataset``, its main one first: what its study asks for, if it suits.
+
+    One case has a figure only of what it has over time, depth or place: its force is a number.
+    """
     if not _known(dataset, "force"):
         return ["nothing"]
     is_over_time, is_path = "time" in dataset.dims, has_path(dataset)
@@ -68,12 +71,14 @@ def choose(dataset: xr.Dataset) -> list[str]:
     suits = {
         "insertion": is_path,
         "history": is_over_time,
-        "force": is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")),
         "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),
         "error": is_meshed(dataset) and (_known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")),
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
+        "force": not is_path and bool(swept(dataset)),
     }
-    kinds = [*(kind for kind, is_suited in suits.items() if is_suited), *([] if is_path else ["force"])]
+    kinds = [kind for kind, is_suited in suits.items() if is_suited]
+    if is_of_depth and (_known(dataset, "linear_ratio") or _known(dataset, "contact_area")):
+        kinds.sort(key=lambda kind: kind not in _OVER_TIME and kind != "force")
     kinds += ["influence"] if _known(dataset, "influence_radius") else []
     kinds += ["compliance"] if "ratio" in kinds and shows_tools(dataset) else []
     study = study_of(dataset)
@@ -120,10 +125,8 @@ def files(
     dataset: xr.Dataset, stem: Path, formats: Sequence[str] = FIGURE_FORMATS, kinds: Sequence[str] | None = None
 ) -> dict[str, list[Path]]:
     """Return by kind the files that :func:`draw` writes, without the rest."""
-    main = choose(dataset)[0]
-    names = {
-        kind: stem.name if kind == main else f"{stem.name}_{kind}" for kind in ([main] if kinds is None else kinds)
-    }
+    main = choose(dataset)[:1]
+    names = {kind: stem.name if kind in main else f"{stem.name}_{kind}" for kind in (main if kinds is None else kinds)}
     return {kind: [stem.with_name(f"{name}.{suffix}") for suffix in formats] for kind, name in names.items()}
 
 

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from epsmesh.quantities import MESH_DIMENSIONS, symbol
 from epsmesh.report.figures.curves import BARS, Panel, draw, grid, positions, share, write_ticks
 from epsmesh.report.figures.facets import Facets, arrange, main_dimension, swept, with_error
-from epsmesh.report.figures.style import CLAIM, FAILED, LINE, QUIET, finish, log_scale, look, new_figure, write_above
+from epsmesh.report.figures.style import CLAIM, FAILED, LINE, QUIET, finish, log_scale, new_figure, write_above
 from epsmesh.report.pareto import front
 from epsmesh.report.study import study_of
 from epsmesh.report.times import doubtful, spreads
 from epsmesh.report.values import answer_of, by_case, relative
-from epsmesh.report.words import at_most, choices, heading, is_numeric, scale
+from epsmesh.report.words import at_most, choices, is_numeric
 from epsmesh.study.sweep import Study
 
 # The paper's claims: 80 % of F_max at ε = 10 mm, 50 times faster.
@@ -29,6 +29,7 @@ _TELLS = {
     "energy_release_ratio": "G/G_max: the same of the energy release.",
     "speedup": "Speed-up: how many times faster than the full-order mesh.",
 }
+_OF_PATH = "What a path is judged by, over the same of the full-order mesh; 1 is no difference."
 _COSTS = ("dofs", "time_total")
 _BARS = "bars are 95\N{NO-BREAK SPACE}% error bars."
 _MOST_PANELS, _MOST_CURVES = 4, 4
@@ -46,18 +47,21 @@ def ratio(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     facets, quantities = ratio_facets(dataset), _ratios(dataset)
     figure, panels = grid(dataset, [facets], quantities)
     study, spread = study_of(dataset), spreads(dataset, "speedup")
-    paper = study if study and study.drawing.paper else None
+    paper, of_path = study if study and study.drawing.paper else None, "quantity" in dataset.dims
     for panel in panels:
         draw(panel)
     share(panels)
     for panel in panels:
+        if of_path and panel.quantity == "force_ratio":
+            panel.ax.set_ylabel("" if panel.column else "share of the full order's")
         if panel.quantity == "speedup":
             if spread is not None:
                 _draw_spread(panel, spread)
             _mark_speedup(panel, claimed=paper is not None)
         else:
             _mark_ratio(panel, claimed=paper is not None and _shows_free(paper, panel.data))
-    notes = [*(_TELLS[name] for name in quantities), facets.note, _repeats(spread), *doubtful(dataset)]
+    tells = _TELLS | ({"force_ratio": _OF_PATH} if of_path else {})
+    notes = [*(tells[name] for name in quantities), facets.note, _repeats(spread), *doubtful(dataset)]
     finish(figure, title, " ".join(filter(None, notes)), warning)
     return figure
 
@@ -72,11 +76,12 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     reference, data = with_error(dataset)
     spread = spreads(dataset, "time_total")
     data = data if spread is None else data.assign(spread=spread)
+    between = "from the full order" if "quantity" in data.dims else f"of F from F_{reference}"
     facets = _error_facets(data)
     figure, panels = grid(data, [replace(facets, x=x) for x in (facets.x, *_COSTS)], ["error"])
     for panel in panels:
         _draw_errors(panel, str(facets.x))
-        panel.ax.set_ylabel(f"distance{'' if panel.column else f' of F from F_{reference}'}, %")
+        panel.ax.set_ylabel(f"distance{'' if panel.column else f' {between}'}, %")
         if panel.column == 0:
             write_ticks(panel.ax, panel.data[facets.x])
     share(panels)
@@ -91,7 +96,7 @@ def error(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     panels[0].ax.set_ylim(max(low, floor / 10) if floor > 0 else low, high)
     of_bar = f"Grey: below the error bar of F_exact{at_most(data['exact_bar'])}."
     notes = [
-        f"Distance of F from F_{reference}: lower is better.",
+        f"Distance {between}: lower is better.",
         "Unknowns and run time: the line joins cases that no other case beats in both."
         " Cases that a finer mesh does not confirm, since its error is larger, are left out.",
         of_bar if reference == "exact" and np.isfinite(floor) else "",
@@ -111,8 +116,6 @@ def error_facets(dataset: xr.Dataset) -> Facets:
 def force(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The force, or the depth at a given one, and what a study has besides, against each swept quantity."""
     dims = swept(dataset)
-    if not dims:
-        return _one(dataset, title, warning)
     shown, first = sorted(dims, key="depth".__ne__)[:_MOST_PANELS], answer_of(dataset)
     tells = f"The {first} against each quantity that the study varies; {_BARS}"
     more = f"Not shown: against {', '.join(map(symbol, dims[_MOST_PANELS:]))}." if dims[_MOST_PANELS:] else ""
@@ -249,22 +252,6 @@ def _name_curves(panel: Panel, at: str) -> int:
     longest = max(map(len, panel.ax.get_legend_handles_labels()[1]), default=0)
     legend = write_above(panel.ax, at, _LETTERS, 2 if longest <= 12 else 1)
     return sum(text.get_text().count("\n") + 1 for text in legend.get_texts())
-
-
-def _one(dataset: xr.Dataset, title: str, warning: str) -> Figure:
-    """Draw the force, or the depth, of the one case."""
-    name = answer_of(dataset)
-    factor, unit = scale(dataset[name])
-    value, bar = (factor * float(dataset[one].squeeze()) for one in (name, f"{name}_error"))
-    share = float(relative(dataset, f"{name}_error").squeeze())
-    figure = new_figure(4.6, 3.3)
-    ax = figure.subplots()
-    ax.errorbar([0], [value], [np.nan_to_num(bar)], capsize=3, linestyle="none", **look(0))
-    ax.set_xticks([0], [f"{value:.4g} {unit} ± {100 * share:.2g} %"])
-    ax.set_ylim(min(0.0, 1.2 * value), max(0.0, 1.2 * value))
-    ax.set_ylabel(heading(dataset[name]))
-    finish(figure, title, f"The {name} of the one case, with its 95\N{NO-BREAK SPACE}% error bar.", warning)
-    return figure
 
 
 def nothing(dataset: xr.Dataset, title: str, _warning: str) -> Figure:

@@ -9,7 +9,9 @@ from typing import Any
 
 import matplotlib as mpl
 from markupsafe import Markup
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from epsmesh.report.figures.style import CLAIM, COLOURS, FAILED, GRID, LINE, PAPER, QUIET, STYLE
 
@@ -24,8 +26,9 @@ _THEME = {colour: f"var(--curve-{i})" for i, colour in enumerate(COLOURS, start=
     LINE: "currentColor",
     PAPER: "var(--paper)",
 }
-# Inches: narrower figures are drawn so wide that they fill the page beside what is said of them.
-_LEAST = 7.8
+# Inches: figures of several columns are drawn so wide at least that they fill the page beside what is said of them; one
+# column alone is so narrow that its letters are legible on a phone.
+_LEAST, _ALONE = 7.8, 4.8
 _POINTS, _PIXELS = 72, 4 / 3  # in an inch; of CSS in a point
 _MARGIN = 2.0  # points left of a column
 _COLOUR = re.compile("|".join(_THEME))
@@ -35,14 +38,15 @@ def in_page(figure: Figure, name: str) -> dict[str, Any]:
     """Return ``figure`` for a page: ``<svg>`` elements, their width (CSS pixels) and caption; ``name`` is its kind.
 
     There is one for each column of panels, and one for a legend beside them: side by side they are the figure, and on a
-    narrow screen they are one below the other. None is shown smaller than it is drawn: letters would be. ``name`` goes
-    before every name in it.
+    narrow screen they are one below the other. None is shown much smaller than it is drawn: letters would be. ``name``
+    goes before every name in it.
     """
     caption = figure.get_label()
     figure.supxlabel("")
     with mpl.rc_context(STYLE):
-        figure.set_figwidth(max(figure.get_figwidth(), _LEAST))
         figure.set_dpi(_POINTS)  # as in the file: places and cuts are then the same
+        figure.draw_without_rendering()
+        figure.set_figwidth(_width(figure))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
         cuts, key = _cuts(figure)
@@ -67,18 +71,38 @@ def in_page(figure: Figure, name: str) -> dict[str, Any]:
     return {"kind": name, "caption": caption, "svg": Markup("".join(parts)), "width": round(width * _PIXELS)}
 
 
+def _width(figure: Figure) -> float:
+    """Return how wide (inches) a figure that is drawn is to be in a page."""
+    width, columns = figure.get_figwidth(), _columns(figure)
+    if columns > 1:
+        return max(width, _LEAST)
+    cuts, _ = _cuts(figure)
+    return width + _ALONE - min([*cuts, _POINTS * width]) / _POINTS if columns else width
+
+
+def _columns(figure: Figure) -> int:
+    """Return how many columns of panels a figure has; 0 if its rows have columns of their own."""
+    places = [place for place in map(_place, figure.axes) if place]
+    is_one = len({id(place.get_gridspec()) for place in places}) == 1
+    return len({place.colspan.start for place in places}) if is_one else 0
+
+
+def _place(ax: Axes) -> SubplotSpec | None:
+    """Return the place of axes among the others: scales of colours have none, and of some versions not the question."""
+    return ax.get_subplotspec() if hasattr(ax, "get_subplotspec") else None
+
+
 def _cuts(figure: Figure) -> tuple[list[float], float]:
     """Return where (pt) a figure may be cut: left of columns, and of a legend or of scales of colours beside them.
 
     A legend ends so far (pt) below the top; 0 without one.
     """
-    # Those of colours have no place among the others, and of some versions not even the question.
-    places = [ax.get_subplotspec() if hasattr(ax, "get_subplotspec") else None for ax in figure.axes]
-    if len({id(place.get_gridspec()) for place in places if place}) != 1:
-        return [], 0.0  # rows have columns of their own
+    if not _columns(figure):
+        return [], 0.0
     drawn = figure.canvas.get_renderer()
     lefts, key = dict[float, float](), 0.0
-    for ax, place in zip(figure.axes, places, strict=True):
+    for ax in figure.axes:
+        place = _place(ax)
         found = {place.colspan.start if place else inf: (ax.yaxis if place else ax).get_tightbbox(drawn).x0}
         if (legend := ax.get_legend()) and (box := legend.get_window_extent(drawn)).x0 > ax.bbox.x1:
             found[inf], key = box.x0, figure.bbox.height - box.y0 + _MARGIN

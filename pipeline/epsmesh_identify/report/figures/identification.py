@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 from epsmesh.files import FIGURE_FORMATS
 from epsmesh.report.figures.style import COLOURS, FAILED, LINE, QUIET, STYLE, finish, new_figure, save
 from epsmesh.study.identified import FITS
-from epsmesh_identify.report.identified import answer, bar, engineering, if_undeclared, title, wanted
+from epsmesh_identify.report.identified import answer, bar, if_undeclared, readable, title, wanted
 
-_WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 7.6, 2.4, 1.2, 1.9, 1.4  # inches
+_WIDTH, _CURVES, _RESIDUALS, _PROFILES, _BESIDE = 4.8, 2.4, 1.2, 1.9, 1.4  # inches
+_WIDER = 1.6  # as wide, of more than two curves side by side
 # Curves and unknowns that are shown; all are in the dataset.
 _MOST_CURVES, _MOST_PROFILES = 3, 4
 _MEASURED, _FIT, _HIDDEN = COLOURS[1], COLOURS[4], COLOURS[3]
@@ -26,7 +27,7 @@ _NORMAL = 3.84  # fall of the likelihood at the ends of a 95 % interval
 _HIGHEST = 6.0
 # Error bars, on both sides of the estimate, that a profile shows, and so many at most of the outer one.
 _NEAR, _FAR = 1.3, 3.0
-_LETTERS = 46  # of a line below all profiles
+_LETTERS, _ROW = 30, 2  # letters of a line below a row of profiles, and how many are in one
 
 
 def identification(dataset: xr.Dataset, name: str, *, answered: bool = True) -> Figure:
@@ -46,8 +47,9 @@ def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
     shown = wanted(dataset)[:_MOST_PROFILES]
     shown = [one for one in shown if bool(np.isfinite(dataset["low"].sel(unknown=one)))]
     count = min(dataset.sizes["measurement"], _MOST_CURVES)
-    heights = [_CURVES + _RESIDUALS, *([_PROFILES] if shown else [])]
-    figure = new_figure(_WIDTH, sum(heights) + _BESIDE)
+    rows = -(-len(shown) // _ROW)
+    heights = [_CURVES + _RESIDUALS, *[_PROFILES] * rows]
+    figure = new_figure(_WIDTH * (_WIDER if count > _ROW else 1), sum(heights) + _BESIDE)
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     curves = grid[0].subgridspec(2, count, height_ratios=(_CURVES, _RESIDUALS))
     for number in range(count):
@@ -57,10 +59,11 @@ def _of_curves(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
         _draw_curve(upper, lower, one, is_first=number == 0, fits=dataset.attrs["verdict"] == FITS)
         if count > 1:
             upper.set_title(str(one["measurement"].values))
-    if shown:
-        row = grid[1].subgridspec(1, len(shown))
-        for number, unknown in enumerate(shown):
-            _draw_profile(figure.add_subplot(row[number]), dataset, unknown, len(shown), is_first=number == 0)
+    for number in range(rows):
+        own = shown[_ROW * number : _ROW * (number + 1)]
+        places = grid[1 + number].subgridspec(1, len(own))
+        for column, unknown in enumerate(own):
+            _draw_profile(figure.add_subplot(places[column]), dataset, unknown, len(own), is_first=column == 0)
     finish(figure, name, _caption(dataset, lines, count, bool(shown)), legend=False)
     figure.axes[0].legend(loc="best", frameon=False)
     return figure
@@ -195,9 +198,4 @@ def _of_files(dataset: xr.Dataset, name: str, lines: Sequence[str]) -> Figure:
 
 
 def _unit(values: np.ndarray, unit: str) -> tuple[float, str]:
-    """Return the factor from SI to the unit with a prefix that suits the largest of the values, and its name."""
-    if unit in ("", "1"):
-        return 1.0, ""
-    largest = float(np.nanmax(np.abs(values)))
-    number, word = engineering(largest, unit, 12).split(" ")
-    return float(number) / largest if largest else 1.0, word
+    return readable(float(np.nanmax(np.abs(values))), unit)
