@@ -114,7 +114,9 @@ def features_page() -> str:
     lines += ["", "Features that exclude a faster method, or a real-time model:", ""]
     lines += _table(("method", "not with", "reason"))
     lines += [
-        _row(way, feature, _escaped(reason)) for way, found in OBSTACLES.items() for feature, reason in found.items()
+        _row(way, feature, _escaped(reason.replace("{key}", FEATURES[feature].key)))
+        for way, found in OBSTACLES.items()
+        for feature, reason in found.items()
     ]
     return "\n".join(lines) + "\n"
 

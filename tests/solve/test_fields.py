@@ -180,6 +180,21 @@ def test_tissue_without_a_value_is_told_before_a_run(tmp_path):
     assert not _of(tmp_path, {"file": "map.nii.gz", "unit": "Pa"})[1].warnings
 
 
+def test_an_image_in_another_unit_is_doubted_with_its_range(tmp_path):
+    values = _linear_map()
+    _image(tmp_path, values)
+    (warning,) = _of(tmp_path, {"file": "map.nii.gz", "unit": "kPa"})[1].warnings
+    assert 'material.young.unit = "kPa": gives the image ' in warning
+    low, mean, high = (f"{find(values) / 1e3:.4g} MPa" for find in (np.min, np.mean, np.max))
+    assert f"{low} to {high}. The mean, {mean}, is stiffer than soft tissue" in warning
+    assert f"Is {np.mean(values) / 1e3:.4g} kPa meant?" in warning
+
+
+def test_a_function_is_not_doubted(tmp_path):
+    (tmp_path / "field.py").write_text("def young(x):\n    return 8e3 + 0 * x[:, 0]\n")
+    assert not _of(tmp_path, {"function": "field.py:young", "scale": 1e-6})[1].warnings
+
+
 def test_places_without_a_value_have_that_of_the_nearest_voxel(tmp_path):
     values = np.full((22, 22, 12), 1e4)
     values[-3:] = np.nan
@@ -209,8 +224,10 @@ def test_places_without_a_value_have_that_of_the_nearest_voxel(tmp_path):
         ({"formula": "8 kPa", "size": 1}, "material.young.size"),
     ],
 )
-def test_what_is_no_field_is_refused(young, said):
-    assert said in refusal(raw(material={"young": young}))
+def test_what_is_no_field_is_refused_once(young, said):
+    told = refusal(raw(material={"young": young}))
+    assert said in told
+    assert len(told.splitlines()) == 1
 
 
 SLIT = {"shape": "blade", "length": "8 mm", "width": "1 mm", "incision": "8 mm", "ahead": "3 mm", "radius": None}

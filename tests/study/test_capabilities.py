@@ -111,3 +111,33 @@ def test_an_obstacle_is_told_with_its_reason():
 def test_exact_forces_are_the_default_and_beside_an_accuracy_they_are_asked_for(exact, mesh, has):
     case = study(**(HAVING[mesh] if mesh else {}), solve={"exact": exact}).case(())
     assert ("F_exact" in case.features) == has
+
+
+FIELD = {"young": {"formula": "20 kPa*(1 - z/(20 mm))"}}
+SPREAD = {"spread": {"young": "30 %", "correlation_length": "4 mm"}}
+FIBRES = {"law": "holzapfel", "fibres": {"direction": [1, 0, 0], "k1": 0.5, "k2": 2.0}}
+
+
+@pytest.mark.parametrize(
+    ("feature", "own", "key"),
+    [("varying stiffness", FIELD, "young"), ("spread", SPREAD, "spread"), ("fibres", FIBRES, "law")],
+)
+def test_what_a_layer_sets_is_named_by_the_key_of_the_layer(feature, own, key):
+    layer = {"name": "skin", "thickness": "3 mm", "young": "20 kPa", "poisson": 0.3}
+    large = {"law": "neo-hookean"} if own is FIBRES else {}
+    skin, fat = (layer | own, layer) if feature != "fibres" else (layer | own, layer | large)
+    layers = [fat | {"name": "fat"}, skin]
+    case = study(material=large, body={"layer": layers}).case(())
+    assert FEATURES[feature].told(case)[0] == f"body.layer[2].{key}"
+    assert FEATURES[feature].told(study(material=large | own).case(()))[0] == f"material.{key}"
+    for way in ("SOFA scene", "real-time model"):
+        if feature in OBSTACLES[way]:
+            assert (
+                obstacle(way, replace(case, probe=study().case(()).probe)).startswith(f"body.layer[2].{key}: ") or large
+            )
+
+
+def test_a_spread_of_a_layer_is_refused_with_its_key():
+    layer = {"name": "skin", "thickness": "3 mm", "young": "20 kPa", "poisson": 0.3}
+    with pytest.raises(StudyError, match=r"body\.layer\[1\]\.spread: with friction"):
+        parse(raw(body={"layer": [layer | SPREAD]}, probe=SPHERE | {"friction": 0.3}))

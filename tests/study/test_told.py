@@ -138,6 +138,10 @@ IMPLAUSIBLE = {
         {"material": {"young": "10 Pa"}},
         ["material.young", "10 Pa", "softer than any tissue", "10 kPa meant"],
     ),
+    "pascals of a formula": (
+        {"material": {"young": {"formula": "10 Pa*(1 - z/(9 mm))"}}},
+        ['material.young.formula = "10 Pa*(1 - z/(9 mm))"', "10 Pa at the origin", "10 kPa meant"],
+    ),
     "gigapascals": ({"material": {"young": "10 GPa"}}, ["10 GPa", "stiffer than soft tissue", "10 kPa meant"]),
     "a layer of steel": ({"body": {"layer": [BONE | {"young": "210 GPa"}]}}, ["stiffer than bone", "210 kPa meant"]),
     "micrometres": ({"probe": {"depth": "0.2 µm"}}, ["probe.depth", "0.2 µm", "0.2 mm meant"]),

@@ -122,9 +122,8 @@ class Varying(Section):
             self._reference = value
 
     def _read_function(self) -> None:
-        if not function_in(str(self.function))[0].is_file():
-            raise _refused(f"`function` {self.function}: there is no such file")
-        self._content = " ".join(content_of(str(self.function)))
+        if function_in(str(self.function))[0].is_file():  # else the study is refused
+            self._content = " ".join(content_of(str(self.function)))
 
     @property
     def young(self) -> float:
@@ -146,6 +145,12 @@ class Varying(Section):
     def detail(self) -> float:
         """The size (m) of voxels; infinite without an image."""
         return float(self._values.spacing.min()) if self.kind == "file" else inf
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The least and the largest modulus (Pa) of an image."""
+        known = self.scale * self._values.values[np.isfinite(self._values.values)]
+        return float(known.min()), float(known.max())
 
     @property
     def notices(self) -> tuple[str, ...]:

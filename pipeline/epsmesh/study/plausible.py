@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
+from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.problems import Problems
 from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material
@@ -26,6 +27,8 @@ def check_moduli(body: Body, material: Material, problems: Problems) -> None:
     """Warn of moduli that soft tissue does not have."""
     for key, tissue in tissues_of(body, material):
         young, most = tissue.young, _STIFFEST if key == "material" else _BONE
+        if tissue.varying is not None and tissue.varying.kind == "function":  # no value of it is known here
+            continue
         if young < _SOFTEST:
             why = "is softer than any tissue, of which brain and fat have some hundred pascals"
         elif young > most:
@@ -33,7 +36,19 @@ def check_moduli(body: Body, material: Material, problems: Problems) -> None:
             why = why if key == "material" else "is stiffer than bone, which has about 20 GPa"
         else:
             continue
-        problems.warn(f"{key}.young", _pressure(young), f"{why}. Is {_pressure(_like_tissue(young))} meant?")
+        where, found, what = _found(f"{key}.young", tissue)
+        problems.warn(where, found, f"{what}{why}. Is {_pressure(_like_tissue(young))} meant?")
+
+
+def _found(key: str, tissue: Tissue) -> tuple[str, str | None, str]:
+    """Return the key of a modulus, its value, and for a field what is known of it, before what is wrong with it."""
+    field = tissue.varying
+    if field is None:
+        return key, _pressure(tissue.young), ""
+    if field.kind == "file":
+        low, high = map(_pressure, field.range)
+        return f"{key}.unit", field.unit, f"gives the image {low} to {high}. The mean, {_pressure(field.young)}, "
+    return f"{key}.formula", field.formula, f"is {_pressure(field.young)} at the origin, which "
 
 
 def check_tools(placed: Sequence[tuple[Body, Probe]], problems: Problems) -> None:

@@ -17,7 +17,9 @@ from epsmesh.shapes.probe import STICK, Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import in_mm
 from epsmesh.shapes.term import BodyTerm
+from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.loads import Load
+from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material, Mesh
 from epsmesh.viscoelastic import Terms
 
@@ -46,23 +48,36 @@ class Scene(Protocol):
 class Feature:
     """A feature: the ``key`` of a study that sets it, whether a scene has it, and how its value is written.
 
-    ``also`` are other sections on which the feature depends.
+    ``also`` are other sections on which the feature depends. ``where`` returns key and value of a scene that has it, if
+    the key differs from scene to scene.
     """
 
     key: str
     holds: Callable[[Scene], bool]
     also: tuple[str, ...] = ()
     write: Callable[[Any], Any] = lambda value: value if isinstance(value, str | float) else None
+    where: Callable[[Scene], tuple[str, Any] | None] = lambda _: None
 
     @property
     def parts(self) -> tuple[str, ...]:
         """The sections of a scene on which the feature depends."""
         return self.key.partition(".")[0], *self.also
 
-    def value(self, scene: Scene) -> Any:
-        """Return the value of the key, as a message quotes it; None if no value is worth quoting."""
-        section, _, key = self.key.partition(".")
-        return self.write(getattr(getattr(scene, section), key, None))
+    def told(self, scene: Scene) -> tuple[str, Any]:
+        """Return key and value of a scene that has it, as a message quotes them; None if no value is worth quoting."""
+        section, _, name = self.key.partition(".")
+        key, value = self.where(scene) or (self.key, getattr(getattr(scene, section), name, None))
+        return key, self.write(value)
+
+
+def _of_tissue(name: str, has: Callable[[Tissue], bool], **how: Any) -> Feature:
+    """Return the feature that a tissue has by its key ``name``: a scene has it if one of its tissues does."""
+
+    def first(scene: Scene) -> tuple[str, Any] | None:
+        tissues = tissues_of(scene.body, scene.material)
+        return next(((f"{place}.{name}", getattr(tissue, name)) for place, tissue in tissues if has(tissue)), None)
+
+    return Feature(f"material.{name}", lambda scene: first(scene) is not None, ("body",), where=first, **how)
 
 
 # Sections that fit together in pairs only: the probe is somewhere on the body.
@@ -109,15 +124,6 @@ def _relaxations(scene: Scene) -> set[Terms]:
 
 def _is_large(scene: Scene) -> bool:
     return scene.body.main(scene.material).is_large
-
-
-def _varies(scene: Scene) -> bool:
-    return any(tissue.varying is not None for tissue in (scene.body.main(scene.material), *scene.body.regions))
-
-
-def has_spread(scene: Scene) -> bool:
-    """Return whether the modulus of a tissue is a random field."""
-    return any(tissue.spread is not None for tissue in (scene.body.main(scene.material), *scene.body.regions))
 
 
 def _coefficient(friction: float) -> float | str:
@@ -197,9 +203,9 @@ FEATURES: dict[str, Feature] = {
     "time steps in three dimensions": Feature(
         "probe.history", lambda s: needs_time_steps(s) and _is_in_space(s), ("body", "material", "mesh", "load")
     ),
-    "fibres": Feature("material.law", lambda s: any(t.has_fibres for t in (s.material, *s.body.regions)), ("body",)),
-    "varying stiffness": Feature("material.young", _varies, ("body",), lambda _: None),
-    "spread": Feature("material.spread", has_spread, ("body",), lambda _: None),
+    "fibres": _of_tissue("law", lambda tissue: tissue.has_fibres),
+    "varying stiffness": _of_tissue("young", lambda tissue: tissue.varying is not None, write=lambda _: None),
+    "spread": _of_tissue("spread", lambda tissue: tissue.spread is not None, write=lambda _: None),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
     "ν < 0.2": Feature(
         "material.poisson",

@@ -6,7 +6,7 @@ A way is a reduction, a dataset's variable or a real-time model. A scene with an
 from epsmesh.study.capabilities.features import FEATURES, Scene
 
 _PRESSED_ONLY = "real-time models are only for tools that press straight down"
-# Of each way that may be shorter, the features with which it is not taken, each with the reason.
+# Of each way that may be shorter, the features with which it is not taken, each with the reason; {key} is what sets it.
 OBSTACLES: dict[str, dict[str, str]] = {
     "meridian": {
         "fibres": "fibres have a direction, and are not axisymmetric",
@@ -95,7 +95,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     },
     "SOFA scene": {
         "large displacements": "material.law: a scene of SOFA is for linear tissue",
-        "varying stiffness": "material.young: a scene of SOFA has one modulus for each region",
+        "varying stiffness": "{key}: a scene of SOFA has one modulus for each region",
         "relaxation": "material.relaxation: a scene of SOFA is static",
         "loads": "[load]: a scene of SOFA has the tool's force alone",
         "terms": "[load], body.capsule: a scene of SOFA has the tool's force and the tissue alone",
@@ -110,8 +110,8 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
         "terms": "[load], body.capsule: springs, capsules and other terms have no real-time model",
-        "fibres": "material.law: fibres have a direction, and the half-space of a real-time model has none",
-        "varying stiffness": "material.young: the half-space of a real-time model has one modulus. Give a value",
+        "fibres": "{key}: fibres have a direction, and the half-space of a real-time model has none",
+        "varying stiffness": "{key}: the half-space of a real-time model has one modulus. Give a value",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
         "layers and inclusions",
         "slit": f"probe.incision: {_PRESSED_ONLY}",
@@ -123,4 +123,5 @@ OBSTACLES: dict[str, dict[str, str]] = {
 
 def obstacle(way: str, scene: Scene) -> str:
     """Return why a scene excludes a shorter way of computing; "" if it does not."""
-    return next((reason for name, reason in OBSTACLES[way].items() if FEATURES[name].holds(scene)), "")
+    name = next((name for name in OBSTACLES[way] if FEATURES[name].holds(scene)), "")
+    return OBSTACLES[way][name].replace("{key}", FEATURES[name].told(scene)[0]) if name else ""

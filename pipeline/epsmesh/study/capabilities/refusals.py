@@ -269,7 +269,7 @@ def check_features(
         for scene in _scenes((*first.parts, *second.parts), sections, placed):
             if first.holds(scene) and second.holds(scene):
                 with problems.about(**vars(scene)):
-                    problems.error(first.key, first.value(scene), refusal.reason)
+                    problems.error(*first.told(scene), refusal.reason)
 
 
 def _scenes(
