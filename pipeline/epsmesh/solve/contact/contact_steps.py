@@ -22,10 +22,10 @@ from epsmesh.solve.contact.deformed import (
     solve_contact,
 )
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
-from epsmesh.solve.contact.surface import Candidates, Neighbours
+from epsmesh.solve.contact.surface import Neighbours
+from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
-from epsmesh.solve.physics import MaterialLaw
 
 # Larger steps than this share, without friction, are given up soon.
 _LARGE = 1 / 8
@@ -73,11 +73,12 @@ class Friction:
     is_linear: bool = False
 
     @classmethod
-    def on(cls, candidates: Candidates, law: MaterialLaw, coefficient: float, depth: float) -> "Friction":
-        """Return the friction of a tool that advances along −z to a ``depth`` (m) on ``candidates`` of a body."""
+    def on(cls, body: DeformedBody, coefficient: float, depth: float) -> "Friction":
+        """Return the friction of a tool that advances along −z to a ``depth`` (m) on a ``body``; collective."""
+        candidates = body.candidates
         width = float(np.median(candidates.widths[candidates.widths > 0]))
-        modulus = float(np.mean(candidates.of_facets(law.plane_moduli)))
-        penalty = np.full(len(candidates), modulus * width)
+        modulus = float(np.mean(candidates.of_facets(body.law.plane_moduli)))
+        penalty = modulus * width + body.stiffness_of_terms()
         return cls(coefficient, np.array([0.0, 0.0, -1.0]), penalty, candidates.neighbours, depth)
 
 
@@ -213,7 +214,6 @@ def friction_step(
         return tool_at(amount).distance(points).gap
 
     references = meeting_places(gap, (before, after), (last.amount, depth), friction.advance)
-    nothing = np.zeros(len(before), dtype=bool)
     touched = last.touched
     if touched is not None:
         carried = before + (depth - last.amount) * friction.advance
@@ -225,7 +225,7 @@ def friction_step(
         references,
         friction.penalty,
         friction.neighbours,
-        slide or Slide(nothing, np.zeros(before.shape)),
+        slide or Slide.none(before.shape),
         normal,
         tissue.fixed,
         most_simplified(depth, friction.deepest),

@@ -32,20 +32,19 @@ _LEAST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """Nodes that slide (n), and their trial tractions (n, t) in N."""
+    """Nodes that slide (n), ``directions`` (n, t) of friction on the tissue, and ``sizes`` (n) of trial tractions (N).
+
+    Directions are unit vectors; at corners the mean of their neighbours', which is shorter where these differ.
+    """
 
     sliding: BoolArray
-    trial: FloatArray
+    directions: FloatArray
+    sizes: FloatArray
 
-    @property
-    def directions(self) -> FloatArray:
-        """Unit vectors (n, t) of the friction on the tissue."""
-        return self.trial / np.maximum(self.sizes, _TINY)[:, None]
-
-    @property
-    def sizes(self) -> FloatArray:
-        """Sizes (n) of the trial tractions (N)."""
-        return np.asarray(np.linalg.norm(self.trial, axis=1))
+    @staticmethod
+    def none(shape: tuple[int, int]) -> "Slide":
+        """Return the state of nodes that do not slide."""
+        return Slide(np.zeros(shape[0], dtype=bool), np.zeros(shape), np.zeros(shape[0]))
 
     def share(self, weights: FloatArray, active: BoolArray) -> float:
         """Return the sliding part of the area of ``active`` nodes (n), whose own areas are ``weights`` (n)."""
@@ -70,7 +69,7 @@ class Slide:
     def towards(self, other: "Slide", fraction: float) -> "Slide":
         """Return ``other`` with directions a ``fraction`` of the way from these, for those that swing to and fro."""
         middle = (1 - fraction) * self.directions + fraction * other.directions
-        return Slide(other.sliding, other.sizes[:, None] * np.where(self.sliding[:, None], middle, other.directions))
+        return replace(other, directions=np.where(self.sliding[:, None], middle, other.directions))
 
     def following(
         self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours, *, single: bool = False
@@ -81,14 +80,15 @@ class Slide:
         of those that change does so: neighbours that change together may do so forever.
         """
         size = np.linalg.norm(trial, axis=1)
-        reverses = np.einsum("nt,nt->n", trial, self.trial) < 0
+        reverses = np.einsum("nt,nt->n", trial, self.directions) < 0
         stays = (size > (1 - _SLACK) * most) & ~reverses
         sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
         if single:
             changes = (sliding != self.sliding) & active & ~neighbours.is_corner
             sliding = np.where(changes & (np.cumsum(changes) > 1), self.sliding, sliding)
         sliding = neighbours.majority(sliding, active) & active
-        return Slide(sliding, neighbours.mean(trial, sliding))
+        sums, sizes = neighbours.sums(trial, sliding)
+        return Slide(sliding, sums / np.maximum(sizes, _TINY)[:, None], sizes)
 
 
 class Touching(Protocol):
@@ -161,7 +161,8 @@ class Simplified:
     def steady(self, before: Slide, after: Slide) -> Slide:
         """Return the state ``after``, in which these nodes slide as ``before``: next to sticking, they reverse."""
         kept = self.nodes & before.sliding
-        return replace(after, trial=np.where(kept[:, None], before.trial, after.trial))
+        directions = np.where(kept[:, None], before.directions, after.directions)
+        return replace(after, directions=directions, sizes=np.where(kept, before.sizes, after.sizes))
 
 
 class Damping:

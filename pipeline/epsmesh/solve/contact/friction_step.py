@@ -145,9 +145,9 @@ class Placed:
 
 
 def _within(place: Placed, slide: Slide) -> Slide:
-    """Return a state with its trial tractions along the tool's surface."""
-    within = slide.trial - np.einsum("ni,ni->n", slide.trial, place.normal)[:, None] * place.normal
-    return replace(slide, trial=within)
+    """Return a state with its directions turned along the tool's surface."""
+    along = slide.directions
+    return replace(slide, directions=along - np.einsum("ni,ni->n", along, place.normal)[:, None] * place.normal)
 
 
 def meeting_places(

@@ -121,6 +121,8 @@ def _of_all(candidates: Candidates, nodes: IntArray, touched: ContactSolution) -
         return found
 
     assert touched.slide is not None
-    slide = Slide(spread(touched.slide.sliding), spread(touched.slide.trial))
+    slide = Slide(
+        *(spread(values) for values in (touched.slide.sliding, touched.slide.directions, touched.slide.sizes))
+    )
     arrays = {name: spread(getattr(touched, name)) for name in ("active", "forces", "gap", "normal")}
     return replace(touched, **arrays, slide=slide)

@@ -158,7 +158,7 @@ class ToolIndentation(ContactIndentation):
         self._tool, self._is_loaded = sagged.placed(tool, tissue), not isnan(sagged.sag)
         self.sag, self.load_energy = sagged.sag, sagged.stored
         self._elastic_before = tissue.elastic_forces()
-        friction = Friction.on(tissue.candidates, law, tool.friction, depth) if tool.friction else None
+        friction = Friction.on(tissue, tool.friction, depth) if tool.friction else None
         super().__init__(tissue, tissue.positions(), 1.0, depth, friction)
 
     def start(self) -> FloatArray | None:

@@ -121,7 +121,7 @@ class LargeContact:
     def _with_friction(self, smooth: "LargeContactSolution") -> "tuple[LargeContactSolution, int]":
         """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
         body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
-        friction = Friction.on(body.candidates, body.law, self._tool.friction, depth)
+        friction = Friction.on(body, self._tool.friction, depth)
         found, iterations = list[ContactSolution](), 0
         for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))

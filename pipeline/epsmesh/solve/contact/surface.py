@@ -123,22 +123,20 @@ class Neighbours:
         votes = np.bincount(corner, np.where(chosen[beside], 1.0, -1.0) * active[beside], len(chosen))
         return np.where(self.is_corner, votes >= 0, chosen)
 
-    def mean(self, vectors: FloatArray, chosen: BoolArray) -> FloatArray:
-        """Return ``vectors`` (n, t), at corners the sum of those of the ``chosen`` neighbours, zero if they cancel."""
+    def sums(self, vectors: FloatArray, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Return ``vectors`` (n, t) and their sizes (n), at corners the sums of those of the ``chosen`` neighbours."""
         corner, beside = self.beside.T
-        kept = np.where(chosen[beside, None], vectors[beside], 0.0)
-        total, size = np.zeros_like(vectors), np.bincount(corner, np.linalg.norm(kept, axis=1), len(vectors))
-        np.add.at(total, corner, kept)
-        total[np.linalg.norm(total, axis=1) <= _CANCELLED * size] = 0.0
-        return np.where(self.is_corner[:, None], total, vectors)
+        own, kept = np.linalg.norm(vectors, axis=1), chosen[beside]
+        total, sizes = np.where(self.is_corner[:, None], 0.0, vectors), np.where(self.is_corner, 0.0, own)
+        np.add.at(total, corner, np.where(kept[:, None], vectors[beside], 0.0))
+        np.add.at(sizes, corner, np.where(kept, own[beside], 0.0))
+        return total, sizes
 
 
 # A point counts as in a plane of symmetry within this distance, in units of the candidates' extent.
 _IN_PLANE = 1e-9
 # Nodes of two degrees are neighbours within this share of an edge, divided by p; mid nodes are included.
 _NEAR = 0.6
-# Vectors whose sum is smaller than this share of them cancel.
-_CANCELLED = 1e-6
 # The degree whose facets have no force of a pressure at their corners.
 _FOLLOWING = 2
 

@@ -16,6 +16,7 @@ from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.hyperelastic import HyperelasticBody
+from epsmesh.solve.krylov import keep
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
@@ -168,6 +169,15 @@ class DeformedBody:
     def on_terms(self) -> FloatArray:
         """The resultant (3), N, of all terms besides the law; collective."""
         return self._body.on_terms(self._now)[0]
+
+    def stiffness_of_terms(self) -> FloatArray:
+        """Return the largest stiffness (n), N/m, that all terms besides the law give each node alone; collective."""
+        found = np.zeros(self._space.owned)
+        with ExitStack() as stack:
+            for term in self._space.terms:
+                if (made := term.operator()) is not None:
+                    found += keep(stack, keep(stack, made).getDiagonal()).array
+        return np.asarray(self._numbering.gather_vectors(found).max(axis=1))
 
     @property
     def work_of_loads(self) -> float:
