@@ -215,6 +215,24 @@ def test_under_loads_tissue_relaxes_to_the_softer_one_under_the_same_loads(probe
     assert np.abs(found.imbalance).max() < 0.2 * found.dissipated[-1]
 
 
+def test_a_tool_may_touch_no_node_at_first():
+    """The first touch of a cone under a load is a corner, which follows its neighbours: no node is active."""
+    cone = {"shape": "cone", "depth": "0.2 mm", "angle": "70 deg", "radius": "8 mm", "tip": "1 mm"}
+    ((_, found),) = solve(
+        body={"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"},
+        material={
+            "young": "10 kPa",
+            "poisson": 0.3,
+            "relaxation": [{"share": 0.4, "time": "2 s"}, {"share": 0.2, "time": "30 s"}],
+        },
+        probe=cone | {"contact": "unilateral", "history": {"ramp": "1 s", "hold": "5 s"}},
+        load={"traction": [{"on": "free", "pressure": "0.2 kPa"}]},
+        mesh={"epsilon": "8 mm", "fine": "3 mm", "coarse": "8 mm", "rim": "0.3 mm", "growth": 0.8, "outside": "coarse"},
+    ).items()
+    assert found.status == "ok", found.message
+    assert found.course["force"][0] == 0.0
+
+
 def test_a_bonded_tool_on_linear_tissue_does_not_feel_the_loads():
     """Superposition; the force counts from the surface as the loads leave it."""
     changes = {"probe": DISC, "material": LINEAR | HEAVY}

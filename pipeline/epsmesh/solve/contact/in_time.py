@@ -35,6 +35,8 @@ from epsmesh.solve.time_steps import Indentation
 
 # Share of the largest contact forces so far to which the residual is compared, where forces have become small.
 _SCALE = 1e-2
+# The same, before the tool touches, in units of the loads on the tissue.
+_OF_LOADS = 1e-4
 
 
 class ContactIndentation(Indentation):
@@ -160,6 +162,7 @@ class ToolIndentation(ContactIndentation):
         self._elastic_before = tissue.elastic_forces()
         friction = Friction.on(tissue, tool.friction, depth) if tool.friction else None
         super().__init__(tissue, tissue.positions(), 1.0, depth, friction)
+        self._scale = 0.0 if applied is None else _OF_LOADS * applied.size
 
     def start(self) -> FloatArray | None:
         """Return the sagged state; None without loads."""
