@@ -41,7 +41,7 @@ def test_friction_that_damping_holds_back_is_a_residual(monkeypatch):
 
 
 def test_friction_of_a_corner_is_continuous_in_that_of_its_neighbours():
-    """Round the apex of a ball tissue slides apart: the direction there is no unit vector, which rounding would turn."""
+    """Round the apex of a ball tissue slides apart: a unit vector there would turn with rounding."""
     beside = np.array([[0, 1], [0, 2]])
     star = Neighbours(np.array([True, False, False]), beside, np.array([True, False, False]))
     every, most = np.ones(3, dtype=bool), np.ones(3)

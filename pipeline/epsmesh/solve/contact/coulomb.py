@@ -42,7 +42,7 @@ class Slide:
     sizes: FloatArray
 
     @staticmethod
-    def none(shape: tuple[int, int]) -> "Slide":
+    def none(shape: tuple[int, ...]) -> "Slide":
         """Return the state of nodes that do not slide."""
         return Slide(np.zeros(shape[0], dtype=bool), np.zeros(shape), np.zeros(shape[0]))
 
