@@ -32,7 +32,7 @@ _POINTWISE = 0.1
 _ROUNDING = 1e-6
 
 
-def influence_of(
+def sums_of_influence(
     solve: Solve, state: State, finer: State | None, contact_error: float = 0.0
 ) -> Mapping[str, tuple[float, ...]]:
     """Return share of F by region, and distance (m) by share of F, with error bars, by their names; collective.

@@ -15,7 +15,7 @@ from epsmesh.plan.steps import Solve
 from epsmesh.run.case_solution import CaseSolution
 from epsmesh.run.compile import prepare
 from epsmesh.run.functions import loaded
-from epsmesh.run.influence import influence_of
+from epsmesh.run.influence import sums_of_influence
 from epsmesh.run.memory import FreeMemory
 from epsmesh.run.problem import conditions_of, lacks_memory, law_of, memory_of, problem_of, solve_problem
 from epsmesh.run.record import Record
@@ -50,7 +50,7 @@ def with_fields(
         notes.append("no influence: the change of the solution with the depth was not found")
     elif solve.case.solve.influence:
         of_contact = 0.0 if isnan(record.contact_radius_error) else record.contact_radius_error
-        record = replace(record, influence=dict(influence_of(solve, state, finer, of_contact)))
+        record = replace(record, influence=dict(sums_of_influence(solve, state, finer, of_contact)))
     if solve.case.outputs:
         found, more = _outputs_of(solve, state, finer, record)
         record, notes = replace(record, largest=record.largest | found), [*notes, *more]

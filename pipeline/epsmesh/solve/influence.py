@@ -29,7 +29,7 @@ from epsmesh.solve.points.state import Influence
 _STEP = 1e-6
 
 
-def influence_of(
+def cell_influence(
     elements: Elements,
     law: MaterialLaw,
     columns: Sequence[Column],

@@ -30,7 +30,7 @@ from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstim
 from epsmesh.solve.elements.displacement import DisplacementElements
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.estimate import error_bar, stiffness_bars
-from epsmesh.solve.influence import influence_of
+from epsmesh.solve.influence import cell_influence
 from epsmesh.solve.linear_solver import LinearSolver
 from epsmesh.solve.movement import Motion, Movement
 from epsmesh.solve.physics import MaterialLaw
@@ -147,20 +147,20 @@ class QuasiStaticProblem(Problem):
             if asked.estimate:
                 solution = self._estimated(solution, found, asked)
             if asked.influence:
-                self._influence = self._influence_of(found, law)
+                self._influence = self._cell_influence(found, law)
             if asked.course is not None:
                 solution = self._followed(solution, found, asked, stack)
             self.elements.show(found.columns)
         return solution
 
     @stage("error bar")
-    def _influence_of(self, found: Equilibrium, law: MaterialLaw) -> Influence | None:
+    def _cell_influence(self, found: Equilibrium, law: MaterialLaw) -> Influence | None:
         """Return the influence on owned cells, None where terms act at rest, or the rate fails; collective."""
         if self.elements.displacements.is_loaded:
             return None
         rate = found.solver.rate(found.columns, found.movement)
         try:
-            return influence_of(self.elements, law, found.columns, rate, found.response.force[2])
+            return cell_influence(self.elements, law, found.columns, rate, found.response.force[2])
         except SolveError:
             return None
 
@@ -195,7 +195,7 @@ class QuasiStaticProblem(Problem):
                 self.finer_state = finer.elements.state(law)
                 if asked.influence:
                     rate = rate_of_linear(finer.elements, finer.columns, movement)
-                    above = influence_of(finer.elements, law, finer.columns, rate)
+                    above = cell_influence(finer.elements, law, finer.columns, rate)
                     self.finer_state = replace(self.finer_state, influence=above)
             form = _form(solution.response, solution.load_response)
             if finer.decrements is None:
