@@ -111,6 +111,7 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.large
 	$(PYTHON) -m benchmarks.organs
+	$(PYTHON) -m benchmarks.influence
 	$(PYTHON) -m benchmarks.spread
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.huge

@@ -26,7 +26,8 @@ from epsmesh.study.influence import DECIDED
 _QUADRATURE, _CHUNK = 6, 20_000
 # Distances at which sums are read, from the least on, in units of the largest; they are interpolated between.
 _LEAST, _DISTANCES = 1e-4, 2_000
-# Least change of a region's share, in units of what changes anywhere in it.
+# Least change of a region's share, in units of what changes anywhere in it; of its effect of ν, which may vanish by
+# chance, in units of the bars of all regions times its share: without, 2 of 32 values were outside, by up to 1.6 times.
 _POINTWISE = 0.1
 # A sum of the influence that lacks no more than this is the whole force.
 _ROUNDING = 1e-6
@@ -71,10 +72,10 @@ def sums_of_influence(
         within += [by_distance(distances, here), by_distance(middles, whole), by_distance(distances, finest)]
     regions, within = (2.0 ** len(body.mirrored) * global_sum(comm, sums) for sums in (regions, within))
     radii = np.array([_radii(np.cumsum(one), edges[1:]) for one in within])
-    share = regions[0, 0]
+    share, of_poisson = regions[0, 0], _bar_of_sums(*regions[1])
     found = {
         "force_share": (share, _bar_of_sums(*regions[0]) + contact_error * np.abs(share * (1 - share))),
-        "poisson_effect": (regions[1, 0], _bar_of_sums(*regions[1])),
+        "poisson_effect": (regions[1, 0], of_poisson + _POINTWISE * np.abs(share) * of_poisson.sum()),
         "influence_radius": (radii[0], _bar_of_radii(*radii)),
     }
     is_known = above is not state.influence
