@@ -31,7 +31,11 @@ def test_a_needle_is_pressed_drawn_in_its_crack_and_pulled_out(tmp_path):
     assert np.abs(across.at(1.0)[..., 1]).max() > 2 * needle.limit
     seen = np.hypot(*np.moveaxis(across.at(1.0), -1, 0))
     assert seen.min() == pytest.approx(needle.limit, rel=1e-2)
-    file = write_film(Pictures(path, needle, pressed, across=across, half=half), tmp_path / "path.gif", "")
+    pictures = Pictures(path, needle, pressed, across=across, half=half)
+    deepest = max(frame.depth for frame in frames_of(path) if frame.is_whole)
+    ends = [scale.get_clim()[1] for scale in pictures.colours]
+    assert ends == pytest.approx([1e3 * deepest, 1e3 * across.size.max()])
+    file = write_film(pictures, tmp_path / "path.gif", "")
     with Image.open(file) as film:
         assert film.n_frames == len(list(frames_of(path)))
         film.seek(film.n_frames - 1)

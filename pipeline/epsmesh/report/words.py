@@ -56,9 +56,14 @@ def barred(value: float, bar: float, unit: str = "") -> str:
     """
     if not bar > 0:
         return f"{value:.{_SPAN}g}{' ± 0' if bar == 0 else ''} {unit}".rstrip()
-    decimals, most = (digits - 1 - _power(number) for digits, number in ((_OF_BAR, bar), (_MOST, value or bar)))
-    decimals = max(0, min(decimals, most))
-    return f"{value:.{decimals}f} ± {max(bar, 10.0**-decimals):.{decimals}f} {unit}".rstrip()
+    places = decimals(value, bar)
+    return f"{value:.{places}f} ± {max(bar, 10.0**-places):.{places}f} {unit}".rstrip()
+
+
+def decimals(value: float, bar: float) -> int:
+    """Return how many decimals a value and its error bar, which is more than nought, are written with."""
+    places, most = (digits - 1 - _power(number) for digits, number in ((_OF_BAR, bar), (_MOST, value or bar)))
+    return max(0, min(places, most))
 
 
 def _power(number: float) -> int:
@@ -74,8 +79,8 @@ def span(name: str, values: Any, unit: str | None = None) -> str:
     factor, word = quantities.readable(name, unit)
     low, high = factor * float(np.nanmin(values)), factor * float(np.nanmax(values))
     largest = max(abs(low), abs(high))
-    decimals = max(0, _SPAN - 1 - floor(log10(largest))) if largest else 0
-    ends = [f"{end:.{decimals}f}" for end in (low, high)]
+    places = max(0, _SPAN - 1 - floor(log10(largest))) if largest else 0
+    ends = [f"{end:.{places}f}" for end in (low, high)]
     while "." in ends[0] and all(end.endswith(("0", ".")) for end in ends):
         ends = [end[:-1] for end in ends]
     if min(abs(low), abs(high)) < _APART * largest:

@@ -50,6 +50,8 @@ def write_film(pictures: Pictures, file: Path, title: str) -> Path:
                 panel.clear()
             pictures.draw(panels, frame)
             if not seen:
+                for panel, colours in zip(panels, pictures.colours, strict=False):
+                    figure.colorbar(colours, ax=panel, label="displacement (mm)", shrink=0.8)
                 figure.tight_layout()
             dot.set_data([_MM * frame.depth], [_MM * frame.force])
             canvas.draw()

@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
 from epsmesh.arrays import FloatArray
 from epsmesh.insertion.steps import WITHDRAWAL
@@ -25,11 +27,11 @@ from epsmesh.study.case import Case
 from epsmesh.view.fields import Fields
 from epsmesh.view.frames import Frame, frames_of
 from epsmesh.view.palette import TOOL
-from epsmesh.view.section import Section, section_of
+from epsmesh.view.section import SCALE, Section, section_of
 
 _MM = 1e3
 # Inches: the widths of the two panels.
-_ALONG, _ACROSS = 3.9, 3.0
+_ALONG, _ACROSS = 4.5, 3.6
 # What is seen along the tool, in last depths: to each side, below the surface, and above it.
 _SIDE, _BELOW, _ABOVE = 0.75, 1.2, 0.25
 # Before the puncture, the last depth is that of the puncture, but so many half widths of the tool at least.
@@ -126,6 +128,12 @@ class Pictures:
         """The largest displacement (m)."""
         pressed = (frame.depth for frame in frames_of(self.path) if frame.is_whole)
         return max([*pressed, *(float(section.size.max()) for section in self.slits.values())], default=0.0)
+
+    @property
+    def colours(self) -> tuple[ScalarMappable, ...]:
+        """What the colours of each section mean (mm), in all frames."""
+        largest = self._largest, *([float(self.across.size.max())] if self.across else [])
+        return tuple(ScalarMappable(Normalize(0, _MM * one), SCALE) for one in largest)
 
     def draw(self, panels: Sequence[Axes], frame: Frame) -> None:
         """Draw a frame into cleared panels."""

@@ -12,7 +12,7 @@ from epsmesh.pages import json_in_page
 from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, QUANTITIES
 from epsmesh.report.study import study_of
 from epsmesh.report.values import by_case, relative
-from epsmesh.report.words import is_numeric, lengths, number, scale, symbol
+from epsmesh.report.words import decimals, is_numeric, lengths, number, scale, symbol
 from epsmesh.states import WORST_FIRST
 
 # Rows of a page of the table.
@@ -64,8 +64,8 @@ _DIGITS = 4
 class Column:
     """A column: ``values`` are numbers (None: none) or, where there are ``words``, the index of a word.
 
-    ``keys`` sort the words of a swept number; ``hint`` is the long name, ``axis`` the title of an axis; ``is_first``
-    columns are shown at first.
+    ``decimals`` are those of the numbers that have an error bar, or are one. ``keys`` sort the words of a swept number;
+    ``hint`` is the long name; ``is_first`` columns are shown at first.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Column:
     hint: str = ""
     words: list[str] | None = None
     keys: list[float] | None = None
+    decimals: list[int] | None = None
     is_filter: bool = False
     is_first: bool = True
 
@@ -82,6 +83,8 @@ class Column:
         value = self.values[row]
         if self.words is not None:
             return self.words[int(value or 0)]
+        if self.decimals is not None and value is not None:
+            return f"{value:.{self.decimals[row]}f}"
         return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
@@ -117,9 +120,7 @@ def case_table(dataset: xr.Dataset) -> Table:
     )
     axes = [_axis(dataset, dim, position, dims) for position, dim in enumerate(dims)]
     quantities = [
-        _quantity(by_case(dataset, name), name)
-        for name in _QUANTITIES
-        if name in dataset and {*dataset[name].dims} <= {*dims}
+        _quantity(dataset, name) for name in _QUANTITIES if name in dataset and {*dataset[name].dims} <= {*dims}
     ]
     status = _texts("status", states, QUANTITIES["status"].meaning, is_filter=True)
     origin = _texts(
@@ -154,19 +155,35 @@ def _axis(dataset: xr.Dataset, dim: str, position: int, dims: list[str]) -> Colu
     return Column(dim, symbol(coordinate), codes.tolist(), hint, words, keys, is_filter=True)
 
 
-def _quantity(array: xr.DataArray, name: str) -> Column:
+def _quantity(dataset: xr.Dataset, name: str) -> Column:
+    array = by_case(dataset, name)
     if name == _SHARE:
         heading, factor, unit = "± F", 100.0, "%"
     else:
         heading, (factor, unit) = symbol(array), scale(array)
-    hint = str(array.attrs.get("long_name", name))
+    hint, flat = str(array.attrs.get("long_name", name)), array.values.ravel()
+    title, places = f"{heading} ({unit})" if unit else heading, _decimals(dataset, name, factor)
     if np.issubdtype(array.dtype, np.integer):
-        values: list[Any] = [int(value) if value >= 0 else None for value in array.values.ravel()]
+        values: list[Any] = [int(value) if value >= 0 else None for value in flat]
+    elif places:
+        known = zip(flat, places, strict=True)
+        values = [round(factor * float(value), digits) if np.isfinite(value) else None for value, digits in known]
     else:
-        flat = array.values.ravel()
         values = [_rounded(value, name, factor) if np.isfinite(value) else None for value in flat]
-    title = f"{heading} ({unit})" if unit else heading
-    return Column(name, title, values, hint, is_first=name in _SHOWN)
+    return Column(name, title, values, hint, decimals=places, is_first=name in _SHOWN)
+
+
+def _decimals(dataset: xr.Dataset, name: str, factor: float) -> list[int] | None:
+    """Return the decimals of each case of a quantity that has an error bar, or is one; None of others.
+
+    A case without a bar has four digits.
+    """
+    value = name if name == _SHARE else name.removesuffix("_error")
+    bar = name if name == _SHARE else f"{value}_error"
+    if value not in dataset or bar not in dataset:
+        return None
+    sizes = (np.nan_to_num(abs(factor * by_case(dataset, one).values.ravel())) for one in (value, bar))
+    return [decimals(size, error or 0.01 * size or 1.0) for size, error in zip(*sizes, strict=True)]
 
 
 def _rounded(value: float, name: str, factor: float) -> float | int:

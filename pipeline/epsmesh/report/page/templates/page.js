@@ -8,7 +8,9 @@ const marked = (text) => escaped(text).replace(/`([^`]+)`/g, "<code>$1</code>");
 
 function textOf(column, row) {
   const value = column.values[row];
-  return column.words ? column.words[value] : value === null ? "" : String(value);
+  if (column.words) return column.words[value];
+  if (value === null) return "";
+  return column.decimals ? value.toFixed(column.decimals[row]) : String(value);
 }
 
 function keyOf(column, row) {
