@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
+from dolfinx import fem
 from mpi4py import MPI
 
 from epsmesh.mesh.distribute import BodyMesh
@@ -15,6 +16,7 @@ from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of, tool_of
 from epsmesh.scene.model import FIXED, FREE, PROBE
 from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import general_form
 from epsmesh.solve.conditions import Conditions
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.elements import elements_of
@@ -189,6 +191,21 @@ def test_planes_of_symmetry_hold_no_body(model):
     rollers = EnergyTerm(energy, ("springs", "rollers"), lambda _, normals: normals[:, 2] < -0.9)
     with pytest.raises(SolveError, match=r"let it (move along|turn about z).*fix a face"):
         solve(rollers, **BALL, mesh={"model": model})
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("comm", [MPI.COMM_SELF, MPI.COMM_WORLD], ids=["alone", "together"])
+def test_a_cap_has_its_area_on_facets_of_half_its_radius(comm):
+    case = study(mesh={"degree": 1, "coarse": "6 mm", "fine": "6 mm"}).case(())
+    body = mesh_case(case, (), comm, None)
+    with Spaces(body) as spaces:
+        u = spaces.get(2, Conditions()).forms.displacement
+        for place, radius in ((-9e-3, 2.5e-3), (-11e-3, 4e-3)):
+            at = Place(
+                body, u, lambda corners, _: corners[:, :, 0].min(axis=1) > 19.9e-3, ((20e-3, 1e-3, place), radius)
+            )
+            area = comm.allreduce(fem.assemble_scalar(general_form(at.constant(1.0) * at.ds)))
+            assert area == pytest.approx(np.pi * radius**2, rel=5e-4)
 
 
 @pytest.mark.mpi

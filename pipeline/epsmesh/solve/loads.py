@@ -6,7 +6,7 @@ Tractions act on the free surface. The edge of a cap crosses facets: these are s
 of the cap.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import FREE
 from epsmesh.solve import SolveError
@@ -30,8 +30,12 @@ _FACETS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # corners of i
 _CURVED = 3
 # Subdivision of facets at a cap's edge: cap radius over size of a piece, and most halvings.
 _PIECE, _MOST_HALVINGS = 32, 7
+# Width over which a piece there passes from outside to inside, in units of the root of its area.
+_WIDTH = 1.2
 # Cells processed together.
 _CHUNK = 20_000
+# Centre (m) and radius (m).
+Ball = tuple[Sequence[float], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,34 +103,15 @@ def _add_weights(
 def _add_traction(load: SurfaceLoad, body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray) -> list[float]:
     """Add a surface load to ``nodal`` forces; return this rank's integrals: x, y, z, magnitude, area."""
     sums = np.zeros(5)
-    free = boundary_of(body, (FREE,))
-    cells, sides, geometry, corners, normals = free.cells, free.sides, free.geometry, free.corners, free.normals
-    halvings = halvings_at_end(load.within, corners)
-    carries = load.on_facets(corners, normals) & (halvings >= 0)
-    degree = compat.degree(space) + (0 if geometry.shape[1] == 4 else _CURVED)
-    for side in range(4):
-        for count in np.unique(halvings[carries & (sides == side)]):
-            chosen = np.flatnonzero(carries & (sides == side) & (halvings == count))
-            flat, quadrature = _rule(degree, int(count))
-            a, b, c = _CORNERS[_FACETS[side]]
-            points = a + flat[:, :1] * (b - a) + flat[:, 1:] * (c - a)
-            values = table_of(compat.degree(space), points)[0]
-            order = 1 if geometry.shape[1] == 4 else 2
-            places, gradients = table_of(order, points)[0], table_of(order, points)[1:]
-            for part in np.array_split(chosen, -(-len(chosen) * len(points) // 500_000)):
-                x = np.einsum("qk,ckx->cqx", places, geometry[part])
-                jacobian = np.einsum("aqk,ckx->cqxa", gradients, geometry[part])
-                areas = np.cross(jacobian @ (b - a), jacobian @ (c - a)) * quadrature[:, None]
-                areas *= np.sign(np.einsum("cqx,cx->cq", areas, normals[part]))[:, :, None]
-                if load.within is not None:
-                    centre, radius = load.within
-                    areas *= (np.linalg.norm(x - np.array(centre), axis=2) <= radius)[:, :, None]
-                size = np.linalg.norm(areas, axis=2)
-                forces = np.array(load.traction) * size[:, :, None] - load.pressure * areas
-                shares = np.einsum("qi,cqx->cix", values, forces)
-                np.add.at(nodal, dofs[cells[part]].reshape(-1), shares.reshape(-1, 3))
-                total, magnitude = forces.sum(axis=(0, 1)), np.linalg.norm(forces, axis=2).sum()
-                sums += [*total, magnitude, size.sum()]
+    free, degree = boundary_of(body, (FREE,)), compat.degree(space)
+    carries = load.on_facets(free.corners, free.normals)
+    for part, points, areas in _areas_at_points(free, carries, load.within, degree):
+        values, size = table_of(degree, points)[0], np.linalg.norm(areas, axis=2)
+        forces = np.array(load.traction) * size[:, :, None] - load.pressure * areas
+        shares = np.einsum("qi,cqx->cix", values, forces)
+        np.add.at(nodal, dofs[free.cells[part]].reshape(-1), shares.reshape(-1, 3))
+        total, magnitude = forces.sum(axis=(0, 1)), np.linalg.norm(forces, axis=2).sum()
+        sums += [*total, magnitude, size.sum()]
     return [*map(float, sums)]
 
 
@@ -166,7 +151,45 @@ def boundary_of(body: BodyMesh, groups: Sequence[str]) -> Boundary:
     return Boundary(facets, cells, sides, geometry, corners, normals)
 
 
-def halvings_at_end(within: tuple[Sequence[float], float] | None, corners: FloatArray) -> Int32Array:
+def areas_within(boundary: Boundary, chosen: BoolArray, ball: Ball) -> FloatArray:
+    """Return the area (m²) of each facet of a ``boundary`` (n) that is within a ``ball``, 0 if it is not ``chosen``."""
+    found = np.zeros(len(chosen))
+    for part, _, areas in _areas_at_points(boundary, chosen, ball, 0):
+        found[part] += np.linalg.norm(areas, axis=2).sum(axis=1)
+    return found
+
+
+def _areas_at_points(
+    boundary: Boundary, chosen: BoolArray, within: Ball | None, degree: int
+) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+    """Yield ``chosen`` facets, quadrature points (q, 3) of the reference cell, and their outward areas (m, q, 3), m².
+
+    Areas outside the ball ``within`` are zero. Integrands have a ``degree``.
+    """
+    sides, geometry, normals = boundary.sides, boundary.geometry, boundary.normals
+    halvings = halvings_at_end(within, boundary.corners)
+    order = 1 if geometry.shape[1] == 4 else 2
+    degree += 0 if order == 1 else _CURVED
+    for side in range(4):
+        for count in np.unique(halvings[chosen & (sides == side) & (halvings >= 0)]):
+            facets = np.flatnonzero(chosen & (sides == side) & (halvings == count))
+            flat, quadrature = _rule(degree, int(count))
+            a, b, c = _CORNERS[_FACETS[side]]
+            points = a + flat[:, :1] * (b - a) + flat[:, 1:] * (c - a)
+            places, gradients = table_of(order, points)[0], table_of(order, points)[1:]
+            for part in np.array_split(facets, -(-len(facets) * len(points) // 500_000)):
+                x = np.einsum("qk,ckx->cqx", places, geometry[part])
+                jacobian = np.einsum("aqk,ckx->cqxa", gradients, geometry[part])
+                areas = np.cross(jacobian @ (b - a), jacobian @ (c - a)) * quadrature[:, None]
+                areas *= np.sign(np.einsum("cqx,cx->cq", areas, normals[part]))[:, :, None]
+                if within is not None and count:
+                    centre, radius = within
+                    width = _WIDTH * np.sqrt(np.linalg.norm(areas, axis=2))
+                    areas *= np.clip(0.5 + (radius - np.linalg.norm(x - centre, axis=2)) / width, 0.0, 1.0)[:, :, None]
+                yield part, points, areas
+
+
+def halvings_at_end(within: Ball | None, corners: FloatArray) -> Int32Array:
     """Return how often to halve each facet's sides for the quadrature, -1 for facets outside the ball ``within``."""
     halvings = np.zeros(len(corners), dtype=np.int32)
     if within is None:
