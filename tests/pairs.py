@@ -174,6 +174,15 @@ def _traction(study: Study) -> None:
     study.setdefault("load", {})["traction"] = [{"on": "free", "pressure": "0.2 kPa"}]
 
 
+def _unloaded(study: Study) -> None:
+    """A body that is given under its loads, of a law for which that matters."""
+    study["body"]["is_loaded"] = "all"
+    if "law" not in study["material"]:
+        study["material"].update(law="mooney-rivlin", c2=0.2)
+    if not study.get("load") and not any(region.get("pressure") for region in study["body"].get("region", ())):
+        _update("load", gravity=["0 m/s^2", "0 m/s^2", "-5 m/s^2"])(study)
+
+
 def _output(study: Study) -> None:
     study["output"] = [{"name": "mises", "region": "body", "of": "von_mises", "reduce": "mean"}]
 
@@ -301,6 +310,7 @@ FEATURES = (
     Feature("formula", "young", _update("material", young={"formula": "10 kPa*(1 + 0.3*z/(20 mm) + 0.1*x/(20 mm))"})),
     Feature("stiffness map", "young", _update("material", young={"file": "map.nrrd", "unit": "kPa"})),
     Feature("swept E", "young", _update("material", young=["10 kPa", "20 kPa"])),
+    Feature("unloaded shape", "shape", _unloaded),
     Feature("output", "output", _output),
     Feature("influence", "influence", _update("solve", influence=True)),
     # A spread asks for the influence: the two are one feature.

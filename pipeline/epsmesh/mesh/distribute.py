@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import Int32Array, IntArray
+from epsmesh.arrays import FloatArray, Int32Array, IntArray
 from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.parts import Part, renumbered
 from epsmesh.scene.model import MIRROR
@@ -22,7 +22,8 @@ class BodyMesh:
     """A distributed mesh and the facets, local to this rank, of each boundary group.
 
     ``regions`` are the region numbers of local cells, ghosts included; None for a body of one material. ``deviation``
-    (m) is the largest distance of its points from the surface in a file of triangles; NaN for other bodies.
+    (m) is the largest distance of its points from the surface in a file of triangles; NaN for other bodies. Where the
+    mesh is that of a body without load, ``imaged`` (n, 3), m, are its nodes as the study gives them, under load.
     """
 
     mesh: Any
@@ -30,6 +31,12 @@ class BodyMesh:
     cells: int  # global
     regions: Int32Array | None = None
     deviation: float = nan
+    imaged: FloatArray | None = None
+
+    @property
+    def shown(self) -> FloatArray:
+        """The local nodes (n, 3), m, of the shape that the study gives: its places are on that one."""
+        return np.asarray(self.mesh.geometry.x) if self.imaged is None else self.imaged
 
     @property
     def owned_cells(self) -> int:

@@ -27,7 +27,7 @@ PHYSICS_VERSION = 15
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
 # Keys of a body that its mesh does not depend on.
-_NOT_MESHED = ("capsule",)
+_NOT_MESHED = ("capsule", "is_loaded")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/epsmesh/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -75,6 +75,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [f"capsule {text_of(case.body.capsule)}"] if case.body.capsule else []
+    tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
 
@@ -128,11 +129,13 @@ def _rim_text(case: Case) -> tuple[str, ...]:
 def operator_key(case: Case) -> str:
     """Return the key of a case's spaces and boundary conditions on its mesh: all further inputs but the moduli.
 
-    The depth is left out, too, if contact is found or displacements are large. Fields of moduli are conditions, too.
+    The depth is left out, too, if contact is found or displacements are large. Fields of moduli are conditions, too. A
+    shape without load is that of a law and its loads.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
-    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *fields])
+    shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *fields, *shape])
 
 
 def normalised(case: Case) -> Case:
@@ -212,6 +215,10 @@ def _tissue_content(tissue: Tissue) -> dict[str, Any]:
     law = {"law": tissue.law} if tissue.is_large else {}
     field = {} if tissue.varying is None else {"field": tissue.varying.identity}
     return {"young": tissue.young, "poisson": tissue.poisson, **law, **tissue.further, **field}
+
+
+def _tissue_text(tissue: Tissue) -> str:
+    return _text(_tissue_content(tissue))
 
 
 def _time_text(case: Case) -> str:

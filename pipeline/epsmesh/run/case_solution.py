@@ -201,7 +201,7 @@ class CaseSolution:
     def _corners(self) -> FloatArray:
         """Return the corners (8, 3) of the box of the whole mesh; collective."""
         body = self.solved.state.body
-        x = np.asarray(body.mesh.geometry.x)
+        x = body.shown
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         if len(x):
             low, high = x.min(axis=0), x.max(axis=0)

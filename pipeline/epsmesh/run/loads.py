@@ -12,7 +12,7 @@ from epsmesh.shapes.term import BodyTerm
 from epsmesh.solve.movement import Loads, SurfaceLoad
 from epsmesh.solve.terms import AddedTerm, EnergyTerm
 from epsmesh.study.case import Case
-from epsmesh.study.loads import Traction
+from epsmesh.study.loads import Load, Traction
 
 _Test = Callable[[FloatArray, FloatArray], BoolArray]
 # A facet belongs to a cap if the cosine between its normal and that at the cap's centre exceeds this.
@@ -21,9 +21,16 @@ _SAME_WAY = 0.5
 
 def loads_of(case: Case) -> Loads | None:
     """Return the loads of ``case``, None if there are none."""
-    load, turn = case.load, case.frame.turn
-    if not load.acts:
-        return None
+    return _loads(case, case.load) if case.load.acts else None
+
+
+def imaged_loads_of(case: Case) -> Loads | None:
+    """Return the loads under which the body has its given shape; None if it has it without load."""
+    return None if case.imaged is None else _loads(case, case.imaged)
+
+
+def _loads(case: Case, load: Load) -> Loads:
+    turn = case.frame.turn
     weights: tuple[Vector, ...] = ()
     if any(load.gravity):
         gravity = _turned(turn, load.gravity)

@@ -25,7 +25,7 @@ def change_with_wider_voxels(solved: Solved) -> tuple[float, float] | None:
         cells = np.flatnonzero(regions % len(images) == number)
         if image is None or not len(cells):
             continue
-        points, weights = places(np.asarray(body.mesh.geometry.x)[nodes[cells]])
+        points, weights = places(body.shown[nodes[cells]])
         own, wider = (one.at(points.reshape(-1, 3)).reshape(weights.shape) for one in (image, image.coarsened()))
         relative = np.where(np.isfinite(wider), wider, own) / own - 1
         volumes = weights.mean(axis=1) / 6  # of the reference cell

@@ -13,7 +13,7 @@ from epsmesh.plan.symmetry import slides_across
 from epsmesh.plan.thin import cause
 from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import variation_of
-from epsmesh.run.loads import loads_of, terms_of
+from epsmesh.run.loads import imaged_loads_of, loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
 from epsmesh.shapes.contact import first_touch, normal_at_touch
 from epsmesh.shapes.distance import Distance
@@ -41,6 +41,7 @@ from epsmesh.solve.plane.ring import ring_cuts
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.unloaded import show_image, unload
 from epsmesh.study.case import Case
 from epsmesh.study.way import Constraint, Motion
 from epsmesh.units import canonical
@@ -59,16 +60,29 @@ class CaseFailure(Exception):
 def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: bool = False) -> QuasiStaticProblem:
     """Return the problem on the mesh of ``case``, with its elements; collective.
 
-    The mesh was made for ``case``, whose probe gives the tool's place. ``condense``: many depths follow.
+    The mesh was made for ``case``, whose probe gives the tool's place. ``condense``: many depths follow. Where it shows
+    the body under load, it is moved to the shape without (:func:`.unloaded.show_image` undoes it): the spaces are those
+    of the problem from then on.
 
     Raises:
         CaseFailure: if it is a needle that cuts, which has no body: it is solved in a plane section.
+        LargeError: if there is no shape without load.
     """
     if case.probe.crack:
         raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
     tool = tool_of(case) if case.way.is_found else None
     degree, conditions = case.mesh.degree, conditions_of(case)
-    return QuasiStaticProblem(spaces, degree, conditions, case.way.element, tool=tool, reuse=reuse, condense=condense)
+    loads, shape = imaged_loads_of(case), None
+    if loads is not None and spaces.body.imaged is None:
+        shape = unload(spaces.body, degree, conditions, case.way.element, law_of(case), loads)
+        spaces = Spaces(shape.body)
+    try:
+        return QuasiStaticProblem(
+            spaces, degree, conditions, case.way.element, tool=tool, reuse=reuse, condense=condense, shape=shape
+        )
+    except SolveError:
+        show_image(spaces.body)
+        raise
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:

@@ -43,6 +43,7 @@ from epsmesh.solve.contact.sweep import NEAR
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
+from epsmesh.solve.unloaded import show_image
 from epsmesh.stages import Times, recorded
 from epsmesh.states import FAILED, PARTIAL
 
@@ -144,6 +145,7 @@ class StepRunner:
             for solve in _in_order(step, condensed=condense) if reuse or condense else step.solves:
                 if solve.key not in self._records:
                     self._record(solve, partial(self._solve, solve, problem, meshed))
+        show_image(problem.spaces.body)
 
     def _share_far_fields(self) -> None:
         """Compute the far fields of all places at once; if this fails, each is computed alone. Collective."""
@@ -218,7 +220,7 @@ class StepRunner:
         has_bar = has_bar and not missing
         solution = solve_problem(solve.case, problem, estimate=has_bar, meshed=solve.meshed_case)
         record = record_of(solve, solution, meshed.times.mesh)
-        record, notes = with_fields(solve, problem, meshed.spaces, record, has_bar=has_bar)
+        record, notes = with_fields(solve, problem, problem.spaces, record, has_bar=has_bar)
         missing = "; ".join(filter(None, (missing, notes, solution.contact.note if solution.contact else "")))
         stamped = self._stamp(record, meshed.memory)
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)

@@ -146,7 +146,7 @@ def _attempt(
         has_bar = room or solve.goal is not None
         influence = influence and not refused("influence", still)
         solution = solve_problem(still, problem, estimate=has_bar, meshed=meshed, keep=True, influence=influence)
-        state, finer = problem.state(), problem.finer_state
+        state, finer, mesh = problem.state(), problem.finer_state, problem.spaces.body
     compile_law(comm, state)
     clear = clear_cells(mesh, conditions_of(case).front, wholly=True)
     put_back(case, meshed, mesh, [state] if finer is None else [state, finer])
@@ -178,17 +178,20 @@ def put_back(case: Case, meshed: Case, mesh: BodyMesh, states: Sequence[State]) 
 
     Return a function that undoes it for the mesh.
     """
-    x: Any = mesh.mesh.geometry.x
-    before = x.copy()
+    places: list[Any] = [mesh.mesh.geometry.x, *([] if mesh.imaged is None else [mesh.imaged])]
+    before = [x.copy() for x in places]
     if (turn := case.frame.turn) is not None:
-        x[:] = x @ turn
+        for x in places:
+            x[:] = x @ turn
         for state in states:
             values = state.displacement.x.array
             values[:] = (values.reshape(-1, 3) @ turn).reshape(-1)
     if (shift := np.subtract(case.frame.point, meshed.frame.point)).any():
-        x[:] += shift
+        for x in places:
+            x[:] += shift
 
     def undo() -> None:
-        x[:] = before
+        for x, earlier in zip(places, before, strict=True):
+            x[:] = earlier
 
     return undo

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 from itertools import accumulate
 from math import inf
-from typing import Annotated, Any, ClassVar, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from epsmesh.arrays import FloatArray
 from epsmesh.shapes.capsule import Capsule
@@ -60,6 +60,15 @@ class Body(Section, ABC):
         Capsule | None,
         Words("Capsule: a membrane on the body's surface.", "[body.capsule]", default="none"),
     ] = None
+
+    is_loaded: Annotated[
+        Literal["none", "gravity", "all"],
+        Words(
+            "Loads under which the body has the given shape: none, gravity alone, or all of [load] and pressures in "
+            "hollow regions. The shape without them is computed, and loaded again before the tool presses.",
+            '"gravity"',
+        ),
+    ] = "none"
 
     def is_capsule_mirrored(self, normal: Vector) -> bool:
         """Tell whether the capsule, if any, is its own image in a plane with that unit normal, as the shape is."""

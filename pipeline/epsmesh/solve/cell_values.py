@@ -35,7 +35,7 @@ _CORNERS = 4
 # λ/μ up to which volume counts in energies: beyond, that of degree p is of the elements more than of the tissue.
 _MOST_RATIO = 10.0
 # For each mesh, by the front of its slit: the cells that are clear of singular edges.
-_clear: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionary()
+CLEAR_CELLS: WeakKeyDictionary[Any, dict[Front | None, BoolArray]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ class CellValues:
         }
 
     def _clear_of(self, front: Front | None) -> BoolArray:
-        known = _clear.setdefault(self._body.mesh, {})
+        known = CLEAR_CELLS.setdefault(self._body.mesh, {})
         if front not in known:
             known[front] = clear_cells(self._body, front)
         return known[front]

@@ -207,8 +207,8 @@ def halvings_at_end(within: Ball | None, corners: FloatArray) -> Int32Array:
 
 
 def _nodes(body: BodyMesh) -> FloatArray:
-    """Return the nodes (m) of each local cell, (cells, 4 or 10, 3)."""
-    return np.asarray(body.mesh.geometry.x[compat.geometry_dofs(body.mesh)])
+    """Return the nodes (m) of each local cell, (cells, 4 or 10, 3), of the shape that the study gives."""
+    return np.asarray(body.shown[compat.geometry_dofs(body.mesh)])
 
 
 @cache

@@ -16,7 +16,7 @@ from epsmesh.solve.compiled import quadrature_degree
 # Marks of cells, and the rounding error of an edge's bulge, in units of its length.
 _NEITHER, STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
-_curved: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
+CURVED: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0, everywhere: bool = False) -> Any:
@@ -59,9 +59,9 @@ def measures_of(
 
 def curved_cells(mesh: Any) -> BoolArray | None:
     """Return a mask of local cells with a mid node off the middle of its edge; None if cells have no mid nodes."""
-    if mesh not in _curved:
-        _curved[mesh] = _find_curved(mesh)
-    return _curved[mesh]
+    if mesh not in CURVED:
+        CURVED[mesh] = _find_curved(mesh)
+    return CURVED[mesh]
 
 
 def has_curved_cells(mesh: Any) -> bool:

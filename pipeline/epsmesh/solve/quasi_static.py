@@ -41,7 +41,8 @@ from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
 from epsmesh.solve.terms import check_hold
 from epsmesh.solve.time_steps import Indentation, TimeSteps, follow_course
-from epsmesh.stages import recorded, stage
+from epsmesh.solve.unloaded import Unloaded
+from epsmesh.stages import recharge, recorded, stage
 
 
 class Constraint(Protocol):
@@ -74,11 +75,12 @@ class QuasiStaticProblem(Problem):
         tool: Tool | None = None,
         reuse: bool = False,
         condense: bool = False,
+        shape: Unloaded | None = None,
     ):
         """Prepare elements of a ``degree``, of the kind "displacement" or "mixed"; collective.
 
         Unilateral contact needs the ``tool``. With ``reuse`` the last solution is the initial guess of the next solve;
-        ``condense``: see ``ContactSearch``.
+        ``condense``: see ``ContactSearch``. The ``spaces`` of a ``shape`` without load are closed with the problem.
 
         Raises:
             SolveError: if footprint and support share a point: no displacement satisfies both; or if nothing holds the
@@ -89,7 +91,7 @@ class QuasiStaticProblem(Problem):
         self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
-        self._body, self._conditions = spaces.body, conditions
+        self._body, self._conditions, self.spaces, self._shape = spaces.body, conditions, spaces, shape
         space = self.elements.displacements
         self._values = CellValues(
             self._body, space.forms.displacement, is_mixed=element == "mixed", factors=space.means
@@ -103,6 +105,8 @@ class QuasiStaticProblem(Problem):
         """Free what is kept between solves."""
         self.constraint.close()
         self.elements.close()
+        if self._shape is not None:
+            self.spaces.close()
 
     @property
     def corrections(self) -> dict[Motion, tuple[FloatArray, ...]]:
@@ -125,8 +129,10 @@ class QuasiStaticProblem(Problem):
                 check; a ContactError, if contact is not found.
         """
         self._law, self.finer_state, self._influence = asked.law, None, None
-        law = asked.law
+        law, of_shape = asked.law, {} if self._shape is None else self._shape.found
         with recorded() as times, ExitStack() as stack:
+            if self._shape is not None:
+                recharge(self._shape.times)
             found = self.constraint.solve(asked, stack)
             front, tip = self._released(self.elements, found.columns, law, found.movement)
             self.elements.show(found.columns)
@@ -135,7 +141,7 @@ class QuasiStaticProblem(Problem):
                 response=found.response,
                 load_response=found.load_response,
                 contact=found.contact,
-                largest=self._values.largest(law, self._conditions.front),
+                largest=self._values.largest(law, self._conditions.front) | of_shape,
                 dofs=self.elements.whole_dofs,
                 cells=self._body.cells,
                 iterations=found.iterations,

@@ -289,6 +289,20 @@ class Spaces:
             self._made.popitem()
 
 
+def shown_places(body: BodyMesh, space: Any) -> FloatArray:
+    """Return the places (n, 3), m, of the local points of a ``space``, on the shape that the study gives."""
+    if body.imaged is None:
+        return np.asarray(space.tabulate_dof_coordinates())
+    nodes = compat.geometry_dofs(body.mesh)
+    of_nodes = fem.Function(vector_space(body.mesh, 1 if nodes.shape[1] == 4 else 2))
+    dofs = compat.cell_dofs(of_nodes.function_space).reshape(-1)
+    of_nodes.x.array.reshape(-1, 3)[dofs] = body.shown[nodes.reshape(-1)]
+    found = fem.Function(space)
+    found.interpolate(of_nodes)
+    found.x.scatter_forward()
+    return np.array(found.x.array).reshape(-1, 3)
+
+
 def factors_of(body: BodyMesh, conditions: Conditions) -> Factors | None:
     """Return the factors of the energy, None if the stiffness does not vary; collective.
 

@@ -33,7 +33,7 @@ _CHUNK = 1_000_000
 _CORNERS = 4
 _AT_CORNERS = np.vstack([np.zeros(3), np.eye(3)])
 # For each mesh, the factors of the last variation.
-_known: WeakKeyDictionary[Any, dict["Variation", "Factors"]] = WeakKeyDictionary()
+KNOWN: WeakKeyDictionary[Any, dict["Variation", "Factors"]] = WeakKeyDictionary()
 
 
 class Field(Protocol):
@@ -104,9 +104,9 @@ class Variation:
         Raises:
             SolveError: if a field has no positive value somewhere in its region.
         """
-        known = _known.get(body.mesh, {})
+        known = KNOWN.get(body.mesh, {})
         if self not in known:
-            known = _known[body.mesh] = {self: self._factors(body)}
+            known = KNOWN[body.mesh] = {self: self._factors(body)}
         return known[self]
 
     def _factors(self, body: BodyMesh) -> Factors:
@@ -128,7 +128,7 @@ class Variation:
         for number, one in enumerate(self.fields):
             if one is not None:
                 cells = np.flatnonzero(regions == number)
-                yield one, cells, np.asarray(body.mesh.geometry.x)[nodes[cells]]
+                yield one, cells, body.shown[nodes[cells]]
 
     def _sampled(self, of: Field, nodes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, str]:
         """Return means over cells with these ``nodes``, variances, rests and corners, and a refusal."""

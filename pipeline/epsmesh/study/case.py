@@ -13,7 +13,14 @@ from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
-from epsmesh.study.capabilities.features import features_of, is_loaded, needs_time_steps, terms_of, touches_inclined
+from epsmesh.study.capabilities.features import (
+    features_of,
+    imaged_load,
+    is_loaded,
+    needs_time_steps,
+    terms_of,
+    touches_inclined,
+)
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.closure import FarRegion
 from epsmesh.study.loads import Load
@@ -86,6 +93,12 @@ class Case:
     def terms(self) -> tuple[BodyTerm, ...]:
         """What else has an energy: terms of [load], and the body's capsule."""
         return terms_of(self)
+
+    @property
+    @of_scene
+    def imaged(self) -> Load | None:
+        """The load under which the body has its given shape; None if it has it without load."""
+        return imaged_load(self)
 
     @property
     def labels(self) -> tuple[tuple[str, float | int | str], ...]:

@@ -36,6 +36,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         if body.capsule:
             with problems.about(body=body):
                 _check_place(body, body.capsule.on, "body.capsule.on", problems)
+    problems.each(lambda body, _: _check_imaged(body, loads, problems), body=bodies)
     for body, load in product(bodies, loads):
         if body.fixed == NONE and not any(term.HOLDS for term in load.terms):
             with problems.about(body=body):
@@ -52,6 +53,15 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for number, traction in enumerate(load.traction, start=1):
             with problems.about(body=body):
                 _check_traction(body, probes, traction, f"load.traction[{number}].on", problems)
+
+
+def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None:
+    """Report a body that has its shape under loads of which the study has none."""
+    is_all, what = body.is_loaded == "all", "gravity" if body.is_loaded == "gravity" else "load"
+    if body.is_loaded == "none" or any(any(load.gravity) or (is_all and load.acts) for load in loads):
+        return
+    if not (is_all and body.pressures):
+        problems.error("body.is_loaded", body.is_loaded, f"there is no {what} in [load]: add it, or omit is_loaded")
 
 
 def _nothing_holds(problems: Problems) -> None:

@@ -88,7 +88,8 @@ def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
 def _gathered(state: State, points: int) -> tuple[FloatArray, FloatArray]:
     """Return, on rank 0, the displacement of every point of the mesh as it was made, and the strain of every cell.
 
-    A displacement of higher degree is interpolated to the order of the mesh: exact at its nodes.
+    A displacement of higher degree is interpolated to the order of the mesh: exact at its nodes. It counts from the
+    shape that the study gives.
     """
     mesh, displacement = state.body, state.displacement
     principal = CellValues(mesh, displacement, is_mixed=state.pressure is not None).principal_strains(state.law)
@@ -101,6 +102,7 @@ def _gathered(state: State, points: int) -> tuple[FloatArray, FloatArray]:
     dofs = compat.cell_dofs(nodal.function_space)[:owned].reshape(-1)
     numbers, first = np.unique(_input_numbers(mesh.mesh)[nodes], return_index=True)
     values = np.asarray(nodal.x.array).reshape(-1, 3)[dofs[first]]
+    values += (mesh.mesh.geometry.x - mesh.shown)[nodes[first]]
     strain = np.abs(principal).max(axis=1)
     at_points = _assembled(mesh.comm, points, numbers, values)
     return at_points, _assembled(mesh.comm, mesh.cells, compat.original_cells(mesh.mesh)[:owned], strain)

@@ -38,12 +38,14 @@ def nodes_of(state: State, mirrors: tuple[str, ...]) -> LagrangeNodes | None:
     if degree == order:
         return None
     at = compat.equidistant_nodes(degree)
-    corners = np.asarray(body.mesh.geometry.x)[compat.geometry_dofs(body.mesh)[:owned]]
+    nodes = compat.geometry_dofs(body.mesh)[:owned]
+    corners, unloaded = body.shown[nodes], (np.asarray(body.mesh.geometry.x) - body.shown)[nodes]
     dofs = compat.cell_dofs(state.displacement.function_space)[:owned]
     values = np.asarray(state.displacement.x.array).reshape(-1, 3)[dofs]
     places, moved = (
         np.einsum("qk,nkd->nqd", table_of(of, at)[0], each) for of, each in ((order, corners), (degree, values))
     )
+    moved += np.einsum("qk,nkd->nqd", table_of(order, at)[0], unloaded)
     numbers = state.displacement.function_space.dofmap.index_map.local_to_global(dofs.reshape(-1).astype(np.int32))
     parts = body.comm.gather((compat.original_cells(body.mesh)[:owned], np.reshape(numbers, dofs.shape), places, moved))
     if parts is None:

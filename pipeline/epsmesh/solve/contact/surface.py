@@ -16,6 +16,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import PROBE
 from epsmesh.solve.physics import of_regions
+from epsmesh.solve.spaces import shown_places
 
 FACET_CORNERS = 3
 # Corners of the facet opposite to each corner of the reference tetrahedron, and an equilateral facet.
@@ -145,11 +146,11 @@ _FOLLOWING = 2
 class Candidates:
     """Candidate nodes of one degree, and the facets between them; equal on every rank.
 
-    ``numbers`` (n) are the nodes' global numbers (blocks) in the space, ``points`` (n, 3) are in m. ``facets`` (m, k)
-    index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have the same facets. ``is_edge``
-    (n) marks nodes on the boundary of the candidates, planes of symmetry aside. ``regions`` (m) are those of the tissue
-    below the facets, ``factors`` (m) those of its energy. Only ``local_facets`` (m) differ by rank: the facets' numbers
-    there, −1 for facets of others.
+    ``numbers`` (n) are the nodes' global numbers (blocks) in the space, ``points`` (n, 3), m, are on the shape that the
+    study gives. ``facets`` (m, k) index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have
+    the same facets. ``is_edge`` (n) marks nodes on the boundary of the candidates, planes of symmetry aside.
+    ``regions`` (m) are those of the tissue below the facets, ``factors`` (m) those of its energy. Only
+    ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others.
     """
 
     numbers: IntArray
@@ -269,7 +270,7 @@ def find_candidates(body: BodyMesh, space: Any, factors: FloatArray | None = Non
     side = np.argmax(of_cell.array.reshape(-1, tdim + 1)[cell] == facets[:, None], axis=1)
     shape = facet_nodes(compat.degree(space))
     dofs = np.take_along_axis(compat.cell_dofs(space)[cell], shape.places[side], axis=1)
-    x = np.asarray(space.tabulate_dof_coordinates())[dofs]
+    x = shown_places(body, space)[dofs]
     regions = np.zeros(len(cell), dtype=np.int64) if body.regions is None else body.regions[cell]
     own = np.ones(len(cell)) if factors is None else factors[cell]
     of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions, own))

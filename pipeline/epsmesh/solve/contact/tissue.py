@@ -57,6 +57,9 @@ class DeformedBody:
             self._body.carry(applied)
         self._unit = elements.unit(law)
         self._numbering = Numbering(space.space, self.candidates.numbers)
+        self._places = self.candidates.points
+        if space.body.imaged is not None:
+            self._places = self._numbering.gather_vectors(space.places)
         self._tangent: TurnedTangent
         if method == "direct":
             self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, stack)
@@ -152,7 +155,7 @@ class DeformedBody:
     @property
     def places(self) -> FloatArray:
         """The nodes' places (n, 3) at rest, in m."""
-        return self.candidates.points
+        return self._places
 
     # ---- results ----------------------------------------------------------------------------------------
 

@@ -40,11 +40,15 @@ class Located:
 
 
 class Locator:
-    """Finds points in the cells that this rank owns of a dolfinx ``mesh`` of tetrahedra; nothing is collective."""
+    """Finds points in the cells that this rank owns of a dolfinx ``mesh`` of tetrahedra; nothing is collective.
 
-    def __init__(self, mesh: Any):
+    Points are those of the mesh with its nodes as ``imaged`` (m), if these are given.
+    """
+
+    def __init__(self, mesh: Any, imaged: FloatArray | None = None):
         owned = mesh.topology.index_map(mesh.topology.dim).size_local
-        self._nodes = np.asarray(mesh.geometry.x)[compat.geometry_dofs(mesh)[:owned]]
+        self._own = np.asarray(mesh.geometry.x)[compat.geometry_dofs(mesh)[:owned]]
+        self._nodes = self._own if imaged is None else imaged[compat.geometry_dofs(mesh)[:owned]]
         self.order = 1 if self._nodes.shape[1] == 4 else 2
         low, high = self._nodes.min(axis=1), self._nodes.max(axis=1)
         margin = (_BULGE if self.order > 1 else INSIDE) * (high - low).max(axis=1, initial=0.0, keepdims=True)
@@ -82,7 +86,8 @@ class Locator:
 
     def map(self, located: Located) -> tuple[FloatArray, FloatArray]:
         """Return, at the points found, the Jacobian dx/dX (k, 3, 3) and its inverse; NaN where it is singular."""
-        jacobian = self._map(located.cells[located.found], located.reference[located.found])[1]
+        cells, at = located.cells[located.found], located.reference[located.found]
+        jacobian = np.einsum("rnk,nkd->ndr", table_of(self.order, at)[1:], self._own[cells])
         return jacobian, _inverse(jacobian)
 
     def _candidates(self, points: FloatArray) -> tuple[IntArray, IntArray]:

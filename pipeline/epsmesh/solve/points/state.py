@@ -84,7 +84,7 @@ class State:
     @cached_property
     def locator(self) -> Locator:
         """The search for points in the cells of this rank."""
-        return Locator(self.body.mesh)
+        return Locator(self.body.mesh, self.body.imaged)
 
     def at(self, points: FloatArray, *, region: int | None = None) -> Values:
         """Return the values at ``points`` (n, 3), m, of the whole body, the same on every rank; collective.
@@ -142,7 +142,7 @@ class State:
     def _signs(self, points: FloatArray) -> FloatArray:
         """Return the signs (n, 3) that bring points of the whole body into its modelled part."""
         signs = np.ones_like(points)
-        x = np.asarray(self.body.mesh.geometry.x)
+        x = self.body.shown
         for axis in self.body.mirrored:
             farthest = float(x[np.abs(x[:, axis]).argmax(), axis]) if len(x) else 0.0
             side = np.sign(max(self.body.comm.allgather(farthest), key=abs))

@@ -144,6 +144,17 @@ def is_loaded(scene: Scene) -> bool:
     return scene.load.acts or bool(scene.body.pressures)
 
 
+def imaged_load(scene: Scene) -> Load | None:
+    """Return the load, of a case, under which the body has its given shape; None if it has it without load."""
+    load = scene.load.model_copy(update={"traction": ()}) if scene.body.is_loaded == "gravity" else scene.load
+    return load if scene.body.is_loaded != "none" and load.acts else None
+
+
+def _is_imaged(scene: Scene) -> bool:
+    by_gravity, by_all = scene.body.is_loaded == "gravity", scene.body.is_loaded == "all"
+    return (by_gravity and any(scene.load.gravity)) or (by_all and is_loaded(scene))
+
+
 def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
     """Return the terms of the energy besides the law's: those of [load], and the body's capsule."""
     return (*scene.load.terms, *filter(None, [scene.body.capsule]))
@@ -261,6 +272,7 @@ FEATURES: dict[str, Feature] = {
     "accuracy": Feature("mesh.accuracy", lambda s: s.mesh.accuracy is not None),
     "loads": Feature("load", is_loaded, ("body",)),
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
+    "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
     "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
     "capsule": Feature("body.capsule", lambda s: s.body.capsule is not None, write=lambda _: None),
     "tension of the capsule": Feature("body.capsule", _has_tension, write=lambda _: None),

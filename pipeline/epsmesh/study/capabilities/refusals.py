@@ -190,6 +190,10 @@ REFUSALS: tuple[Refusal, ...] = (
         "loads",
         'loads act on the whole body, so no part of it may be cut away: use outside = "coarse"',
     ),
+    # The shape without load.
+    Refusal("unloaded shape", "linear law", "does not change F at small displacements: omit it, or give another law"),
+    Refusal("unloaded shape", "terms", f"is not computed {_WITH_TERMS}: {_NO_TERMS}"),
+    Refusal("unloaded shape", "time steps", f"tissue that creeps has no shape without load: {_STATIC}"),
     # Relaxation, and histories of the depth.
     Refusal(
         "static relaxing tissue",
