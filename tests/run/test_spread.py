@@ -12,11 +12,13 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.quantities import quantity_of
 from epsmesh.report.dataset import build
 from epsmesh.report.influence import OF_NORMAL
-from epsmesh.report.uncertainty import unknowns
+from epsmesh.report.uncertainty import bars, unknowns
 from epsmesh.run.execute import compute
 from epsmesh.run.spread import Sources, _clusters, _integral
-from epsmesh.study.read import parse
+from epsmesh.study.read import parse, read_mapping
+from epsmesh_identify.estimation.dataset import write
 from tests.cases import raw, refusal
+from tests.identifications import identification
 
 WORLD = MPI.COMM_WORLD
 SPREAD = {"young": "30 %", "correlation_length": "4 mm"}
@@ -99,6 +101,19 @@ def test_the_bar_is_half_of_what_holds_95_per_cent_and_the_report_says_what_to_m
     radius = 1e3 * float(found["influence_radius"].sel(decided=0.5))
     assert f"within {radius:.2g} mm of the point of contact, where half of F is decided." in said
     assert "spread" not in unknowns(dataset())
+
+
+def test_an_identified_tissue_with_a_spread_has_three_bars(tmp_path):
+    write(identification(names=("young",)), tmp_path / "one.nc")
+    content = raw() | {"material": {"from": "one.nc", "poisson": 0.4, "spread": SPREAD}}
+    plan = make_plan(read_mapping(content, "using", tmp_path))
+    found = build(plan, compute(plan, MPI.COMM_SELF))
+    mesh, parameters, spread = bars(found)
+    assert (mesh.cause, parameters.cause, spread.cause) == ("mesh", "tissue's parameters", "tissue's spread")
+    assert mesh.share < parameters.share < spread.share
+    # F is proportional to E, which is 12 ± 2 kPa.
+    assert parameters.share == pytest.approx(2e3 / 12e3, rel=1e-6)
+    assert spread.share == pytest.approx(float(sinh(OF_NORMAL * deviation(material={"poisson": 0.4}))), rel=1e-6)
 
 
 def test_sweeps_of_a_spread_have_dimensions_of_their_own():
