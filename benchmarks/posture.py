@@ -1,0 +1,55 @@
+"""What it changes of F that an image shows an organ under its weight: ``python -m benchmarks.posture``.
+
+The study of postures, of a liver, and the same of a brain. F without weight is that of an image which is taken for the
+shape that is free of stress.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from benchmarks.tables import Table, options
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.study.read import parse
+
+STUDY = Path("studies/posture.toml")
+# What is changed for each organ, by section.
+ORGANS: dict[str, dict[str, dict[str, Any]]] = {
+    "liver, 5 kPa": {},
+    "brain, 3 kPa": {
+        "body": {"file": "../meshes/brain.ply", "fixed": {"below": "-10 mm"}},
+        "material": {"young": "3 kPa", "density": "1040 kg/m^3"},
+        "probe": {"radius": "6 mm", "depth": "1.5 mm", "at": ["30 mm", "-10 mm"]},
+    },
+}
+COLUMNS = {
+    "organ": "", "posture": "", "F (mN)": ".2f", "±": ".1%", "F without weight": "+.1%", "unloading (mm)": ".2f",
+    "round trip": ".0e", "s": ".0f",
+}  # fmt: skip
+
+
+def main() -> None:
+    """Solve, print and write."""
+    asked = options(__doc__).parse_args()
+    table = Table(COLUMNS)
+    for organ, changes in ORGANS.items():
+        content = tomllib.loads(STUDY.read_text(encoding="utf-8"))
+        for section, keys in changes.items():
+            content[section] |= keys
+        plan = make_plan(parse(content, file=str(STUDY)))
+        records = compute(plan, MPI.COMM_WORLD)
+        found = {case.words["load"]: records[key] for case, key in zip(plan.study.cases(), plan.keys, strict=True)}
+        weightless = found.pop("weightless").force
+        for posture, record in found.items():
+            unloading = record.largest["unloading"]
+            row = {"organ": organ, "posture": posture, "F (mN)": 1e3 * record.force, "±": record.force_error}
+            row |= {"F without weight": weightless / record.force - 1, "unloading (mm)": 1e3 * unloading}
+            table.add(row | {"round trip": record.largest["round_trip"] / unloading, "s": record.time_total})
+    table.write("posture", asked.output)
+
+
+if __name__ == "__main__":
+    main()
