@@ -113,6 +113,7 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.organs
 	$(PYTHON) -m benchmarks.influence
 	$(PYTHON) -m benchmarks.spread
+	$(PYTHON) -m benchmarks.posture
 	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision

@@ -39,9 +39,10 @@ _FOLDED, _OF_BALL = 5.0, 15.6
 # curved and folded bodies.
 _MIXED, _SEARCH, _LAYERED, _PROOF = 1.4, 2.7, 1.8, 1.6
 # A time step of linear tissue takes as long as the static solve, one of large displacements this part of it. The least
-# number of steps. What friction multiplies: time steps, with half of them again, and load steps of large displacements.
+# number of steps. What friction multiplies: time steps, with half of them again, and load steps of large displacements;
+# and what a shape without load does.
 _STEP_LARGE, _FEWEST_STEPS = 0.1, 6
-_RUBBING_STEP, _RUBBING_LARGE = 6.0, 1.5
+_RUBBING_STEP, _RUBBING_LARGE, _UNLOADED = 6.0, 1.5, 3.0
 _MESHED = {"curved": 2.5, "folded": 18.0}
 _MERIDIAN, _MERIDIAN_BYTES = 0.27, 3.8e8
 # Its kinds, and their times in units of the first: trial radii of a contact; load steps on a few meshes, at large
@@ -177,8 +178,8 @@ def _memory(solve: Solve) -> float:
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
-    It names element, degree, several movements, unilateral contact, friction, several materials, the number of time
-    steps, and a curved or folded body.
+    It names element, degree, several movements, unilateral contact, friction, several materials, a shape without load,
+    the number of time steps, and a curved or folded body.
     """
     case, way = solve.case, solve.way
     if solve.axisymmetric:
@@ -187,6 +188,7 @@ def kind_of(solve: Solve) -> str:
     words += [str(case.movements)] if case.movements > 1 else []
     words += _TOUCH.get(way.constraint, [])
     words += ["regions"] if case.body.regions else []
+    words += ["unloaded"] if case.imaged else []
     words += _steps(case)
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
@@ -297,6 +299,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
         seconds, power = _LARGE[stage]
         if stage == "solve":
             seconds *= (_RUBBING_LARGE if "friction" in words else 1.0) + _STEP_LARGE * steps
+            seconds *= _UNLOADED if "unloaded" in words else 1.0
         is_mixed = element.endswith("-mixed")
         return log(seconds * (_MIXED_LARGE if is_mixed else 1.0)), power, 0.0 if is_mixed else _LOCKING
     rubs = stage == "solve" and "friction" in words
