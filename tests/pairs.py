@@ -166,8 +166,11 @@ def _poisson(value: float) -> Callable[[Study], None]:
     return change
 
 
-def _capsule(study: Study) -> None:
-    study["body"]["capsule"] = {"young": "1 MPa", "thickness": "0.1 mm", "poisson": 0.4}
+def _capsule(**keys: Any) -> Callable[[Study], None]:
+    def change(study: Study) -> None:
+        study["body"]["capsule"] = {"young": "1 MPa", "thickness": "0.1 mm", "poisson": 0.4} | keys
+
+    return change
 
 
 def _traction(study: Study) -> None:
@@ -256,7 +259,9 @@ FEATURES = (
     Feature("inclusion", "inclusion", _inclusion),
     Feature("region", "region", _region),
     Feature("hollow region", "region", _hollow),
-    Feature("capsule", "capsule", _capsule),
+    Feature("capsule", "capsule", _capsule()),
+    Feature("taut capsule", "capsule", _capsule(tension_only=True)),
+    Feature("stretched capsule", "capsule", _capsule(tension_only=True, tension="1 N/m")),
     Feature("nu .49", "poisson", _poisson(0.49)),
     Feature("nu .5", "poisson", _poisson(0.5)),
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),

@@ -9,6 +9,7 @@ The error bar comes from one degree more: :mod:`epsmesh.solve.large_estimate`.
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from petsc4py import PETSc
@@ -221,13 +222,27 @@ class LoadSteps(Solver):
         )
 
     def _force_again(self, finer: Elements, column: Column, movement: Movement, stack: ExitStack) -> float:
-        """Return the force (N) on the modelled part in elements of one degree more."""
+        """Return the force (N) on the modelled part in elements of one degree more.
+
+        Where terms act before the tool does, those elements have a force at the start of the path already.
+        """
         (above,) = finer.columns(movement, stack)
         with self._body.state() as state:
-            self._at(column, state)
-            preconditioner = self._linear.finer_preconditioner()
+            again = partial(
+                force_again,
+                self.elements,
+                self._body,
+                state,
+                finer,
+                self._law,
+                above,
+                self._linear.finer_preconditioner(),
+            )
             try:
-                return force_again(self.elements, self._body, state, finer, self._law, above, preconditioner)
+                state.array[:] = self._load_path.start.state
+                at_start = again() if self._space.is_loaded else 0.0
+                self._at(column, state)
+                return again() - at_start
             except LargeError as error:
                 raise LargeError(
                     f"no error bar: elements of degree {finer.degree} fail at the probe's edge ({error}); "
@@ -247,7 +262,10 @@ class LoadSteps(Solver):
         state.array[: self._space.owned] = column.prescribed[: self._space.owned]
 
     def _checked_path(self, state: PETSc.Vec, column: Column) -> FloatArray:
-        """Continue ``state`` as :meth:`_reach`, in many steps if the force of a few does not tell the work."""
+        """Continue ``state`` as :meth:`_reach`, in many exact steps if the force of a few does not tell the work.
+
+        Where terms act before the tool does, they may load the support by far more than F: steps are then rough.
+        """
         with self._body.state() as start:
             start.array[:] = self._load_path.start.state
             size = max(self._law.lame_mu) * self._volume() + abs(self._body.energy(start))
@@ -256,11 +274,11 @@ class LoadSteps(Solver):
             check_path(path, _ROUNDING * size)
         except LargeError:
             self._load_path.restart()
-            path = self._reach(state, column, _MANY)
+            path = self._reach(state, column, _MANY, LEFT)
             check_path(path, _ROUNDING * size)
         return path
 
-    def _reach(self, state: PETSc.Vec, column: Column, fewest: int) -> FloatArray:
+    def _reach(self, state: PETSc.Vec, column: Column, fewest: int, on_the_way: float = ON_THE_WAY) -> FloatArray:
         """Continue ``state`` along the load path to the depth of a column, in at least ``fewest`` steps from its start.
 
         Return the path: depth, force and energy of each step. A step is halved where Newton's method does not converge.
@@ -279,7 +297,7 @@ class LoadSteps(Solver):
                 state.array[:] = load_path.continued(amount)
                 if not np.isfinite(body.energy(state)):
                     state.array[:] = load_path.last.state  # the first step of Newton's method then brings it there
-                left = LEFT if amount == depth else ON_THE_WAY
+                left = LEFT if amount == depth else on_the_way
                 iterations = equilibrate(body, state, base + amount * held, left)
                 body.forces(state, forces)
                 load_path.work.append((amount, forces.dot(unit), body.energy(state) - begun))

@@ -256,10 +256,16 @@ class Case:
 
     @property
     def has_quarter_points(self) -> bool:
-        """Whether elements at a singular edge of the probe have quarter points; deep in tissue they would fold."""
-        if not (self.way.is_large and self.probe.has_singular_edge):
+        """Whether elements at a singular edge of the probe have quarter points.
+
+        Deep in tissue they would fold. Of slopes like r^-½, the squares in Green's strain of a capsule have no finite
+        energy.
+        """
+        if not self.probe.has_singular_edge:
             return True
-        return self.probe.depth <= _SHALLOW * self.probe.half_width
+        if self.body.capsule is not None and self.body.capsule.tension_only:
+            return False
+        return not self.way.is_large or self.probe.depth <= _SHALLOW * self.probe.half_width
 
     @property
     def column(self) -> float:

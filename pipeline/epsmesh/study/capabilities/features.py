@@ -164,6 +164,10 @@ def _has_tension(scene: Scene) -> bool:
     return scene.body.capsule is not None and scene.body.capsule.tension > 0
 
 
+def _is_compressed(scene: Scene) -> bool:
+    return scene.body.capsule is not None and not scene.body.capsule.tension_only
+
+
 def _moves_surface(scene: Scene) -> bool:
     """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
     return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(terms_of(scene)))
@@ -275,6 +279,7 @@ FEATURES: dict[str, Feature] = {
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
     "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
     "capsule": Feature("body.capsule", lambda s: s.body.capsule is not None, write=lambda _: None),
+    "capsule that bears compression": Feature("body.capsule.tension_only", _is_compressed, write=lambda _: False),
     "tension of the capsule": Feature("body.capsule", _has_tension, write=lambda _: None),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.

@@ -243,6 +243,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("half ball", "terms", f"the far field has neither those of [load] nor a capsule: {_COARSE}"),
     Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
     Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
+    Refusal(
+        "capsule that bears compression",
+        "large displacements",
+        f"must be true {_OF_LAW}: a membrane that is compressed wrinkles",
+    ),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
