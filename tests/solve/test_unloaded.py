@@ -6,15 +6,18 @@ from mpi4py import MPI
 
 from epsmesh import compat
 from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.run.fields import variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of
 from epsmesh.run.meshing import mesh_case
-from epsmesh.run.problem import law_of
+from epsmesh.run.problem import conditions_of, law_of
+from epsmesh.run.solved import solve_alone, solve_fields
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import Spaces, shown_places
 from epsmesh.solve.unloaded import ROUND_TRIP, show_image, unload
+from epsmesh.view.compute import fields_of
 from tests.cases import raw, refusal, solve, study
 from tests.studies import changed
 
@@ -140,3 +143,35 @@ def test_the_key_has_the_load_of_the_image():
 def test_a_load_is_needed():
     content = {"material": SOFT, "body": {"is_loaded": "gravity"}, "load": SQUEEZE}
     assert "there is no gravity in [load]" in refusal(raw(**content))
+
+
+def test_places_are_those_of_the_given_shape_and_pictures_show_it():
+    """Values are asked at places of the given shape; their displacements count from the shape without load."""
+    chosen = study(material=SOFT, load=DOWN, body={"is_loaded": "all"})
+    solved = solve_fields(solve_alone(chosen, chosen.case(())), MPI.COMM_SELF)
+    fields, (found,) = fields_of(solved), solved.state.at(np.array([[16e-3, -16e-3, -1e-3]])).displacement
+    assert fields is not None
+    assert np.abs(fields.points).max(axis=0) == pytest.approx([20e-3, 20e-3, 20e-3])
+    moved = np.linalg.norm(fields.displacement, axis=1)
+    assert moved.max() == pytest.approx(0.2e-3, rel=0.01)  # the depth
+    assert np.linalg.norm(found) > 0.5 * solved.record.largest["unloading"] > moved.max()
+    far = np.linalg.norm(fields.points - [20e-3, 20e-3, 0.0], axis=1).argmin()
+    assert moved[far] < 0.05e-3
+
+
+def test_a_map_of_the_modulus_is_on_the_given_shape():
+    young = {"formula": "1 kPa * (1 + max(z + 20 mm, 0 mm)/(10 mm))"}
+    case = study(
+        material=SOFT | {"young": young, "poisson": 0.2},
+        load=UP,
+        body={"is_loaded": "all"},
+        probe={"at": ["20 mm", "0 mm", "-10 mm"]},
+    ).case(())
+    body = mesh_case(case, (), MPI.COMM_SELF)
+    shown = variation_of(case).factors(body)
+    at_points = shown.at_points(4)
+    found = unload(body, 2, conditions_of(case), "displacement", law_of(case), imaged_loads_of(case))
+    moved = variation_of(case).factors(found.body)
+    assert found.largest > 1e-3
+    assert moved.means == pytest.approx(shown.means, rel=1e-12)
+    assert moved.at_points(4) == pytest.approx(at_points, rel=1e-12)

@@ -80,7 +80,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
         return QuasiStaticProblem(
             spaces, degree, conditions, case.way.element, tool=tool, reuse=reuse, condense=condense, shape=shape
         )
-    except SolveError:
+    except Exception:
         show_image(spaces.body)
         raise
 

@@ -77,11 +77,13 @@ def unload(
     try:
         with recorded() as times:
             follow(path, lambda amount: shape.at(_scaled(loads, amount), path, amount), 1.0, shortest=_SHORTEST)
-    except LargeError as error:
+    except Exception as error:
         show_image(shape.body)
+        if not isinstance(error, LargeError):
+            raise
         raise LargeError(
             f"body.is_loaded: no shape without load is found from which more than {100 * path.reached:.0f} % of the "
-            f"loads lead to the image ({error}); check loads, density and modulus, or omit is_loaded"
+            f"loads lead to the given shape ({error}); check loads, density and modulus, or omit is_loaded"
         ) from error
     return Unloaded(shape.body, shape.largest(path.last.state), shape.round_trip, shape.solves, times)
 
