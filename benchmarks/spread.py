@@ -46,6 +46,15 @@ SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], float, float, str]] = {
     "ball of 8 mm, box": (_BOX, _BALL, 0.3, 2.0, "linear"),
     "ball of 8 mm, cylinder": (_CYLINDER, _BALL, 0.49, 8.0, "linear"),
     "ball of 8 mm, plate with a skin": (_PLATE | {"layer": [_SKIN]}, _BALL, 0.45, 4.0, "linear"),
+    "disc of 4 mm, plate, may slide": (
+        _PLATE,
+        _DISC | {"radius": "4 mm", "contact": "frictionless"},
+        0.4,
+        7.0,
+        "linear",
+    ),
+    "ball of 8 mm, ellipsoid": (_ELLIPSOID, _BALL | {"at": ["-4 mm", "3 mm", "19 mm"]}, 0.4, 5.0, "linear"),
+    "blade of 10 × 2 mm, box with a skin": (_BOX | {"layer": [_SKIN]}, _BLADE, 0.45, 3.0, "linear"),
     "disc of 3 mm, box, neo-Hookean": (_BOX, _DISC | {"depth": "0.3 mm"}, 0.4, 3.0, "neo-hookean"),
 }
 SPREADS = (0.2, 0.4)
@@ -75,7 +84,7 @@ class Scene:
 
     def __init__(self, name: str, *, whole: bool):
         body, probe, poisson, _, law = SCENES[name]
-        mesh = _MESH | ({"model": "3d"} if whole else {}) | ({"rim": "0.6 mm"} if probe is _BALL else {})
+        mesh = _MESH | ({"model": "3d"} if whole else {}) | ({"rim": "0.6 mm"} if probe["shape"] == "sphere" else {})
         material = {"young": "10 kPa", "poisson": poisson, "law": law}
         raw = {"body": body, "material": material, "probe": probe, "mesh": mesh}
         study = parse(raw | {"solve": {"exact": False, "influence": True}})
