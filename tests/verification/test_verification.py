@@ -13,6 +13,7 @@ from epsmesh.verify import Row
 from tests.verification import known, table
 from tests.verification.bodies import body_rows
 from tests.verification.boundary import rectangle_stiffness
+from tests.verification.capsules import capsule_rows
 from tests.verification.loads import load_rows
 
 
@@ -34,7 +35,7 @@ def test_a_force_two_bars_off_is_out(installed):
         assert not replace(row, value=float("nan")).is_right
 
 
-@pytest.mark.parametrize("rows", [load_rows, body_rows])
+@pytest.mark.parametrize("rows", [load_rows, body_rows, capsule_rows])
 def test_loads_and_bodies_have_their_closed_forms(rows):
     assert not [row for row in rows(MPI.COMM_SELF, quick=True) if not row.is_right]
 
