@@ -7,6 +7,7 @@ import pytest
 
 from epsmesh.report.dataset import write
 from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
+from epsmesh.report.guide_tables import settings
 from epsmesh.run.record import Record
 from epsmesh.run.store import Store
 from epsmesh.shapes.probes.blade import Blade
@@ -148,13 +149,13 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
 def test_report_and_guide_agree_on_every_number():
     data = dataset()
     found, section = guide(data, USUAL_ACCURACY), guide_if_any(data)
-    assert section.settings.equals(found.settings)
+    assert settings(section).equals(settings(found))
     words = found.text(verbose=True)
     details = [told for _, told in section.details]
     assert all(line in words for line in (section.sentence, *details, *section.others))
     # What takes longest in one scene is not what it usually takes: neither stands for the other.
     slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
-    table = guide_if_any(slow).settings
+    table = settings(guide_if_any(slow))
     assert (table["longest time"] != table["median time"]).all()
 
 

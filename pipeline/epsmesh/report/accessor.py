@@ -7,9 +7,10 @@ import numpy as np
 import xarray as xr
 
 from epsmesh.quantities import MESH_DIMENSIONS
+from epsmesh.report.answer import Guide
 from epsmesh.report.compare import Comparison, compare
 from epsmesh.report.compliance import Against, compliance
-from epsmesh.report.guide import Guide, guide
+from epsmesh.report.guide import guide
 from epsmesh.report.locate import Located, locate
 from epsmesh.report.pareto import front, is_by_chance
 from epsmesh.report.values import at_peak, elastic, relative, with_words

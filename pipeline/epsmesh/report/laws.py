@@ -123,6 +123,14 @@ class Law:
         """The law as people write it."""
         return FORMULAS[self.name]
 
+    @property
+    def constants(self) -> str:
+        """The range of its first constant over the tissues."""
+        name, unit = ("r", "") if self.name == "ratio" else ("c", " 1/m")
+        if f"{self.least:.3g}" == f"{self.most:.3g}":
+            return f"{name} = {self.most:.3g}{unit}"
+        return f"{name} = {self.least:.3g} … {self.most:.3g}{unit}, depending on the tissue"
+
 
 @dataclass(frozen=True)
 class Laws:

@@ -71,6 +71,11 @@ def _power(number: float) -> int:
     return floor(log10(float(f"{abs(number):.{_OF_BAR - 1}e}")))
 
 
+def time(seconds: float) -> str:
+    """Write seconds, in ms where they are few."""
+    return f"{seconds:.3g} s" if seconds >= 0.9995 else f"{1e3 * seconds:.3g} ms"
+
+
 def span(name: str, values: Any, unit: str | None = None) -> str:
     """Write the least and the largest value of a quantity with as many decimals: ``25.02 to 31.00 mN``.
 

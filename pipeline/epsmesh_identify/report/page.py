@@ -31,14 +31,12 @@ def render(dataset: xr.Dataset, name: str) -> str:
     is_one = "file" not in dataset.dims
     fits = not is_one or dataset.attrs["verdict"] == FITS
     columns, rows = _of_one(dataset) if is_one else _of_files(dataset)
-    return render_page(
-        _TEMPLATES / "identification.html.j2",
-        "",
-        PAGE_CSS.parent,
-        title=dataset.attrs.get("title", name),
+    return _page(
+        dataset,
+        name,
+        f"epsmesh identify {study_path(dataset, name)}",
+        f"results/{name}.nc",
         heading="Values and their error bars",
-        name=name,
-        style=joined(PAGE_CSS),
         answer=answer(dataset),
         fits=fits,
         figure=_figure(dataset),
@@ -47,9 +45,6 @@ def render(dataset: xr.Dataset, name: str) -> str:
         is_beside=is_one,
         parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
         material=material(dataset),
-        study=str(dataset.attrs.get("study", "")),
-        commands=[f"epsmesh identify {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{name}.nc')}"],
-        provenance=provenance(dataset),
     )
 
 
@@ -58,27 +53,35 @@ def write_sensitivity(dataset: xr.Dataset, path: Path) -> Path:
     with mpl.rc_context(STYLE):
         figure = in_page(sensitivity(dataset.assign_attrs(title="")), "sensitivity")
     name = path.stem.removesuffix("_sensitivity")
-    page = render_page(
-        _TEMPLATES / "identification.html.j2",
-        "",
-        PAGE_CSS.parent,
-        title=dataset.attrs.get("title", name),
+    page = _page(
+        dataset,
+        name,
+        f"epsmesh run {study_path(dataset, name)}",
+        f"results/{path.stem}.nc",
         heading="Shares of the variance and their error bars",
-        name=name,
-        style=joined(PAGE_CSS),
         answer=sentences(dataset),
         fits=True,
         figure=figure,
         columns=["of", "parameter", "range", "alone", "in all"],
         rows=rows_of(dataset),
-        is_beside=False,
-        parts=[],
-        material="",
-        study=str(dataset.attrs.get("study", "")),
-        commands=[f"epsmesh run {study_path(dataset, name)}", f"epsmesh report {quote(f'results/{path.stem}.nc')}"],
-        provenance=provenance(dataset),
     )
     return write_whole(path, page)
+
+
+def _page(dataset: xr.Dataset, name: str, command: str, file: str, **content: Any) -> str:
+    """Return a page of ``content``; the ``command`` makes the ``file`` that it shows."""
+    return render_page(
+        _TEMPLATES / "identification.html.j2",
+        "",
+        PAGE_CSS.parent,
+        title=dataset.attrs.get("title", name),
+        name=name,
+        style=joined(PAGE_CSS),
+        study=str(dataset.attrs.get("study", "")),
+        commands=[command, f"epsmesh report {quote(file)}"],
+        provenance=provenance(dataset),
+        **{"is_beside": False, "parts": [], "material": ""} | content,
+    )
 
 
 def _figure(dataset: xr.Dataset) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from epsmesh.pages import joined, render_page
 from epsmesh.printable import counted
 from epsmesh.report.figures import choose, figure
 from epsmesh.report.guide import guide_if_any
+from epsmesh.report.guide_tables import settings
 from epsmesh.report.headline import headline
 from epsmesh.report.page.cases import FIRST_ROWS, case_table
 from epsmesh.report.page.facts import (
@@ -70,6 +71,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
         guide=guide,
+        settings=settings(guide) if guide else None,
         answer=[guide.sentence] if guide else headline(over_time),
         bars=[[one.cause, one.size, one.source] for one in known] if len(known) > 1 else [],
         next_step=next_step(known),
