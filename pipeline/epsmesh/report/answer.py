@@ -142,7 +142,7 @@ class Guide:
         found = f"{force}, {self.compared} {exact}" if is_of_paths else f"F = {force}, {self.reference} = {exact}"
         return [
             ("Worst case", f"{found}{where}"),
-            ("Cost", f"{cost(verdict)}, on {self.timing}{' (times are doubtful)' if self.doubts else ''}"),
+            ("Cost", f"{guide_tables.cost(verdict)}, on {self.timing}{' (times are doubtful)' if self.doubts else ''}"),
             ("Mesh", self._elements(verdict.mesh)),
         ]
 
@@ -170,7 +170,7 @@ class Guide:
         """The setting with the fewest unknowns, and those that suffice once F is corrected."""
         chosen, lean, lines = self.answer, self.lean, []
         if chosen and lean and lean is not chosen and lean.dofs < chosen.dofs:
-            lines.append(f"Fewest unknowns: {self._named(lean)} ({cost(lean)}).")
+            lines.append(f"Fewest unknowns: {self._named(lean)} ({guide_tables.cost(lean)}).")
         corrected, none = self.corrected or self.best_corrected, "no setting suffices with it"
         if corrected is None:
             why = "needs more than one scene" if self.scenes == 1 else f"does not help: {none}"
@@ -194,6 +194,12 @@ class Guide:
     def is_of_paths(self) -> bool:
         """Whether paths of insertions are judged: by force and depth of the puncture, and by the last force."""
         return "quantity" in self.axes
+
+    @property
+    def asked(self) -> str:
+        """What is to be within which accuracy of what."""
+        what = "puncture and cutting" if self.is_of_paths else "F"
+        return f"{what} within {percent(self.accuracy)} of {self.compared}"
 
     @property
     def compared(self) -> str:
@@ -221,15 +227,13 @@ class Guide:
 
     def _only_full(self) -> str:
         """Say that no ε suffices beside the full order, and which is the best."""
-        what, best = "puncture and cutting" if self.is_of_paths else "F", self._best_cut
-        none = f"No ε keeps {what} within {percent(self.accuracy)} of {self.compared}{_all(self.scenes)}, {self._bars}."
+        none, best = f"No ε keeps {self.asked}{_all(self.scenes)}, {self._bars}.", self._best_cut
         return f"{none} Best: {self._named(best)}, within {percent(best.error)}." if best else none
 
     def _no_answer(self) -> str:
         limits, best = list[str](), self.best
         if isfinite(self.accuracy):
-            what = "puncture and cutting" if self.is_of_paths else "F"
-            limits.append(f"keeps {what} within {percent(self.accuracy)} of {self.compared}{_all(self.scenes)}")
+            limits.append(f"keeps {self.asked}{_all(self.scenes)}")
         if isfinite(self.budget):
             limits.append(f"takes at most {time(self.budget)} a case")
         none = f"No mesh setting {' and '.join(limits)}"
@@ -287,12 +291,6 @@ def _timing(dataset: xr.Dataset) -> str:
     if any(one["name"] == "axisymmetric" for one in skipped):
         where += ", round scenes on their meridian, with elements of its own"
     return f"{where}, {'every case afresh and alone' if dataset.attrs.get('timing') else 'no timing study'}"
-
-
-def cost(verdict: Verdict) -> str:
-    """Return unknowns, elements and time, the largest over the scenes."""
-    size = f"up to {verdict.dofs:,.0f} unknowns, {verdict.cells:,.0f} elements"
-    return f"{size}, {time(verdict.seconds)} a case (median {time(verdict.usual)})"
 
 
 def _all(count: int) -> str:

@@ -71,7 +71,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
         guide=guide,
-        settings=settings(guide) if guide else None,
+        settings=settings(guide.verdicts, guide.scenes, has_full=guide.has_full) if guide else None,
         answer=[guide.sentence] if guide else headline(over_time),
         bars=[[one.cause, one.size, one.source] for one in known] if len(known) > 1 else [],
         next_step=next_step(known),
