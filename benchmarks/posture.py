@@ -1,7 +1,7 @@
 """What it changes of F that an image shows an organ under its weight: ``python -m benchmarks.posture``.
 
-The study of postures, of a liver, and the same of a brain. F without weight is that of an image which is taken for the
-shape that is free of stress.
+The study of postures, of an ellipsoid with the size of a liver, and the same with that of a brain. F without weight is
+that of an image which is taken for the shape that is free of stress.
 """
 
 import tomllib
@@ -20,9 +20,8 @@ STUDY = Path("studies/posture.toml")
 ORGANS: dict[str, dict[str, dict[str, Any]]] = {
     "liver, 5 kPa": {},
     "brain, 3 kPa": {
-        "body": {"file": "../meshes/brain.ply", "fixed": {"below": "-10 mm"}},
+        "body": {"axes": ["62 mm", "65 mm", "45 mm"], "fixed": {"below": "-10 mm"}},
         "material": {"young": "3 kPa", "density": "1040 kg/m^3"},
-        "probe": {"radius": "6 mm", "depth": "1.5 mm", "at": ["30 mm", "-10 mm"]},
     },
 }
 COLUMNS = {
