@@ -66,7 +66,7 @@ class Feature:
     def told(self, scene: Scene) -> tuple[str, Any]:
         """Return key and value of a scene that has it, as a message quotes them; None if no value is worth quoting."""
         section, _, name = self.key.partition(".")
-        key, value = self.where(scene) or (self.key, getattr(getattr(scene, section), name, None))
+        key, value = self.where(scene) or (self.key, getattr(getattr(scene, section, None), name, None))
         return key, self.write(value)
 
 
