@@ -72,19 +72,24 @@ class Slide:
         return replace(other, directions=np.where(self.sliding[:, None], middle, other.directions))
 
     def following(
-        self, trial: FloatArray, most: FloatArray, active: BoolArray, neighbours: Neighbours, *, single: bool = False
+        self,
+        trial: FloatArray,
+        most: FloatArray,
+        active: BoolArray,
+        neighbours: Neighbours,
+        single_of: BoolArray | None = None,
     ) -> "Slide":
         """Return the next guess, from ``trial`` tractions (n, t) and the largest friction ``most`` (n).
 
-        A node whose trial traction reverses would slide back and forth: it sticks. With ``single``, only the first node
-        of those that change does so: neighbours that change together may do so forever.
+        A node whose trial traction reverses would slide back and forth: it sticks. If ``single_of`` (n) are given, only
+        the first of these that change does so: neighbours that change together may do so forever.
         """
         size = np.linalg.norm(trial, axis=1)
         reverses = np.einsum("nt,nt->n", trial, self.directions) < 0
         stays = (size > (1 - _SLACK) * most) & ~reverses
-        sliding = np.where(self.sliding, stays, size > (1 + _SLACK) * most) & active
-        if single:
-            changes = (sliding != self.sliding) & active & ~neighbours.is_corner
+        sliding = np.where(self.sliding, stays, exceeds(trial, most)) & active
+        if single_of is not None:
+            changes = (sliding != self.sliding) & active & single_of & ~neighbours.is_corner
             sliding = np.where(changes & (np.cumsum(changes) > 1), self.sliding, sliding)
         sliding = neighbours.majority(sliding, active) & active
         sums, sizes = neighbours.sums(trial, sliding)
@@ -203,3 +208,13 @@ def largest_friction(law: FloatArray, normal: FloatArray) -> FloatArray:
     """Return the largest friction (n) in N, from coefficients ``law`` (n) and ``normal`` reactions (n)."""
     sticks = law == inf
     return np.where(sticks, inf, np.where(sticks, 0.0, law) * np.maximum(normal, 0.0))
+
+
+def exceeds(traction: FloatArray, most: FloatArray) -> BoolArray:
+    """Return whether each ``traction`` (n, t) is certainly larger than the largest friction ``most`` (n), N."""
+    return np.asarray(np.linalg.norm(traction, axis=1) > (1 + _SLACK) * most)
+
+
+def shortened(traction: FloatArray, most: FloatArray) -> FloatArray:
+    """Return each ``traction`` (n, t), at most as large as the largest friction ``most`` (n), N."""
+    return np.asarray(traction * np.minimum(most / np.maximum(np.linalg.norm(traction, axis=1), _TINY), 1.0)[:, None])

@@ -322,7 +322,7 @@ class _InContact(Newton[ContactSolution]):
             return residual.size <= max(LEFT, limit) * most
         on_surface = _LEFT_BESIDE if self._friction.is_linear else _LEFT_WITH_FRICTION
         is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= on_surface * most
-        return is_close and self._friction.is_same
+        return is_close and self._friction.is_judged
 
     @property
     def _open(self) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.contact.constraint import Constraint, Sliding
-from epsmesh.solve.contact.coulomb import Damping, Simplified, Slide, largest_friction
+from epsmesh.solve.contact.coulomb import Damping, Simplified, Slide, exceeds, largest_friction, shortened
 from epsmesh.solve.contact.surface import Neighbours
 
 # Iterations from which changes of the directions of slip are damped, and of Newton's method in linear tissue.
@@ -52,7 +52,7 @@ class FrictionIteration:
         self.is_linear = friction_step.is_linear
         self._damping = Damping(_SWINGING_LINEAR if self.is_linear else _SWINGING)
         self._seen, self._single = set[bytes](), False
-        self.is_same = False
+        self.is_judged = False  # with reactions of this step
 
     def update(self, iteration: int, place: "Placed", predicted: FloatArray, before: BoolArray, now: BoolArray) -> None:
         """Take the next state from ``predicted`` forces (n, d) N; active sets (n) are those ``before`` and ``now``."""
@@ -63,14 +63,15 @@ class FrictionIteration:
         most = largest_friction(law, self.normal)
         state = before.tobytes() + self.slide.sliding.tobytes()
         self._single = self._single or state in self._seen
-        following = self.slide.following(trial, most, now, friction_step.neighbours, single=self._single)
+        others = ~self._simple.nodes if self._single else None
+        following = self.slide.following(trial, most, now, friction_step.neighbours, others)
         after = self._simple.sliding(following, now)
         moves = before != now
         turns = (after.sliding != self.slide.sliding) & ~moves
         if moves.any() or turns.any():
             self._seen.add(state)
         self._simple = self._simple.counting(moves, turns) if self._single else self._simple
-        self.is_same = not turns.any()
+        self.is_judged = True
         self._wanted = self._simple.steady(self.slide, after)
         self.slide = self._damping.towards(self.slide, self._wanted, iteration)
 
@@ -96,12 +97,19 @@ class FrictionIteration:
         return np.where(self._with.fixed, 0.0, most[:, None] * _within(place, slide).directions)
 
     def exerted(self, place: "Placed", forces: FloatArray, active: BoolArray) -> FloatArray:
-        """Return the friction (n, d) N of the tool: of nodes that stick what their ``forces`` (n, d) need.
+        """Return the friction (n, d) N that the law wants of nodes with these ``forces`` (n, d), N.
 
-        That of others is what the law wants: damped, it would be near the forces wherever it hardly changes.
+        It is the trial traction, shortened to the largest friction: nodes that stick beyond it, that slide and should
+        stick, and directions that damping holds back are residuals. Corners and simplified nodes follow their state.
         """
         across = forces - np.einsum("ni,ni->n", forces, place.normal)[:, None] * place.normal
-        return np.where(self.sticks(active)[:, None], across, self._friction(place, self._wanted))
+        trial = across - self._with.penalty[:, None] * self.slips(place)
+        most = largest_friction(self._simple.law(self._with.friction), self.normal)
+        is_given, sticks = self._with.neighbours.is_corner | self._simple.nodes, self.sticks(active)
+        slides = np.where(is_given, ~sticks, exceeds(trial, most))
+        sliding = np.where(is_given[:, None], self._friction(place, self._wanted), shortened(trial, most))
+        wanted = np.where(slides[:, None], sliding, trial)
+        return np.where(active[:, None] & ~self._with.fixed, wanted, 0.0)
 
     def constrain(self, constraint: Constraint, place: "Placed", active: BoolArray) -> Constraint:
         """Return a ``constraint`` with the tangents of sticking nodes held, and the friction on sliding ones."""
