@@ -35,6 +35,9 @@ LEFT, _CLOSED = 1e-8, 1e-8
 _ROUNDING = 1e-6
 # With friction: the residual of nodes that slide, where their friction is that of the iteration before, and of others.
 _LEFT_WITH_FRICTION, _LEFT_BESIDE = 1e-4, 1e-7
+# The same in steps of time: where tissue relaxes while the tool is held, nodes slide and stick by turns, next to the
+# limit of friction. The bar of the steps is larger by an order of magnitude.
+_LEFT_IN_TIME = 3e-4
 # A decrease below this share of the energy is rounding.
 _NO_SLOPE = 1e-11
 # Most iterations of a load step, and most times that one active set is solved.
@@ -320,7 +323,8 @@ class _InContact(Newton[ContactSolution]):
             return False
         if self._friction is None:
             return residual.size <= max(LEFT, limit) * most
-        on_surface = _LEFT_BESIDE if self._friction.is_linear else _LEFT_WITH_FRICTION
+        on_surface = _LEFT_WITH_FRICTION if self._scale is None else _LEFT_IN_TIME
+        on_surface = _LEFT_BESIDE if self._friction.is_linear else on_surface
         is_close = residual.inside <= _LEFT_BESIDE * most and residual.on_surface <= on_surface * most
         return is_close and self._friction.is_judged
 
