@@ -38,7 +38,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(ContactPathPoint(0.0, np.zeros_like(body.state)))
-        friction = Friction.on(body.candidates, body.law, FRICTION, DEPTH)
+        friction = Friction.on(body, FRICTION, DEPTH)
         reach_contact_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
 
         def beside(travel):
