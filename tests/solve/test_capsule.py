@@ -18,6 +18,7 @@ from tests.cases import raw as changes_of
 
 SKIN = {"young": "1 MPa", "thickness": "0.1 mm", "poisson": 0.4}
 BALL = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
+ROUNDED = BALL | {"shape": "disc", "radius": "3 mm", "edge": "1 mm", "depth": "0.2 mm"}
 SPHERE = {"shape": "ellipsoid", "size": None, "axes": ["20 mm", "20 mm", "20 mm"], "fixed": {"below": "-19.9 mm"}}
 LARGE = {"law": "neo-hookean", "young": "10 kPa", "poisson": 0.45}
 CYLINDER = {"shape": "cylinder", "size": None, "radius": "30 mm", "height": "30 mm", "fixed": "bottom+sides"}
@@ -144,7 +145,11 @@ def test_a_membrane_pressed_far_is_that_of_one_dimension(tension, known):
 @pytest.mark.parametrize("ratio", [pytest.param(10, marks=pytest.mark.nightly), 1000])
 @pytest.mark.parametrize(
     "tool",
-    [{}, BALL, BALL | {"shape": "disc", "radius": "3 mm", "edge": "1 mm", "depth": "0.2 mm"}],
+    [
+        pytest.param({}, marks=pytest.mark.nightly),
+        BALL,
+        pytest.param(ROUNDED, marks=pytest.mark.nightly),
+    ],
     ids=["bonded", "found", "rounded"],
 )
 def test_at_large_displacements_contact_settles_on_any_capsule(ratio, tool):
@@ -164,7 +169,7 @@ def test_the_force_is_the_derivative_of_the_energy_by_the_depth():
     assert (above.energy - below.energy) / 2e-5 == pytest.approx(at.force, rel=1e-4)
 
 
-@pytest.mark.parametrize("element", ["displacement", "mixed"])
+@pytest.mark.parametrize("element", ["displacement", pytest.param("mixed", marks=pytest.mark.nightly)])
 @pytest.mark.parametrize(
     ("tool", "only", "law"),
     [

@@ -119,7 +119,14 @@ def _force(folder, young, **changes):
     return record.scaled(plan.scale_of(next(plan.study.cases()))) if record.is_ok else record
 
 
-@pytest.mark.parametrize("name", [pytest.param("map.nii.gz", marks=pytest.mark.nightly), "qform.nii.gz", "map.nrrd"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("map.nii.gz", marks=pytest.mark.nightly),
+        pytest.param("qform.nii.gz", marks=pytest.mark.nightly),
+        "map.nrrd",
+    ],
+)
 def test_an_image_is_the_formula_that_it_samples(tmp_path, name):
     _image(tmp_path, _linear_map(), name=name)
     known = force(material={"young": {"formula": "10 kPa*(1 + 0.3*z/(20 mm))"}})

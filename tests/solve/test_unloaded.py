@@ -69,7 +69,10 @@ def test_a_column_under_its_weight_has_the_length_of_the_closed_form(load, degre
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("degree", "element"), [(2, "displacement"), (2, "mixed"), (3, "displacement")])
+@pytest.mark.parametrize(
+    ("degree", "element"),
+    [(2, "displacement"), (2, "mixed"), pytest.param(3, "displacement", marks=pytest.mark.nightly)],
+)
 def test_a_body_that_sagged_is_unloaded_to_what_it_was(degree, element):
     """Loaded to another shape, which is then the image, the body gets its places back, as far as it kept its volume."""
     poisson = 0.5 if element == "mixed" else 0.45
@@ -121,6 +124,7 @@ def test_gravity_alone_was_in_the_image():
     assert gravity.largest["unloading"] == pytest.approx(one(probe=BALL).largest["unloading"], rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_shape_that_no_unloaded_one_leads_to_is_refused_with_the_reason():
     records = solve(
         material=SOFT | {"young": "0.05 kPa"},
