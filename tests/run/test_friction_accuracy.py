@@ -45,5 +45,5 @@ def test_friction_is_no_part_of_what_finer_elements_would_remove():
     stiffness, decrements, bars = (np.array([[value]]) for value in (2.0, 0.02, 0.06))
     ball = Convergence(degree=2, element="displacement")
     _, smooth = extrapolate_found(stiffness, decrements, bars, ball)
-    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, replace(ball, friction=0.01))
+    _, both = extrapolate_found(stiffness, decrements, bars + 0.02, replace(ball, friction_bar=0.01))
     assert both == pytest.approx(smooth + 0.02)

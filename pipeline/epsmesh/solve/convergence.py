@@ -14,8 +14,8 @@ class Convergence:
 
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
     that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
-    bounds the contact. ``friction`` is the part of the relative bar that the next degree does not reduce, ``at_edge``
-    the relative bar on the contact's area for the element size alone.
+    bounds the contact. ``friction_bar`` is the part of the relative bar that the next degree does not reduce,
+    ``at_edge`` the relative bar on the contact's area for the element size alone.
     """
 
     degree: int
@@ -28,5 +28,5 @@ class Convergence:
     plain: float = 0.0
     is_solved: bool = False
     is_ended: bool = False
-    friction: float = 0.0
+    friction_bar: float = 0.0
     at_edge: float = 0.0

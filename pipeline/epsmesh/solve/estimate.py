@@ -232,7 +232,7 @@ def extrapolate_found(
     if not known.is_graded or known.is_ended:
         centre, spread = _FOUND_ENDED if known.is_graded else _FOUND_COARSE[known.degree]
     spread *= _FOUND_ELSEWHERE if known.has_others and known.is_graded else 1.0
-    left = known.friction * np.abs(stiffness)
+    left = known.friction_bar * np.abs(stiffness)
     own, falls = bars - left, decrements > 0
     return stiffness - np.where(falls, centre, 0.0) * own, np.where(falls, spread, 1.0) * own + left
 
@@ -240,7 +240,7 @@ def extrapolate_found(
 def _extrapolate_found_large(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, known: Convergence
 ) -> tuple[FloatArray, FloatArray]:
-    is_ball = known.is_ball and known.degree == _FOUND_LARGE_DEGREE and not known.has_others and not known.friction
+    is_ball = known.is_ball and known.degree == _FOUND_LARGE_DEGREE and not known.has_others and not known.friction_bar
     if not (is_ball and known.is_graded and decrements[0, 0] > 0):
         return stiffness, bars
     (centre, spread), change = _FOUND_LARGE, _FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`

@@ -178,7 +178,9 @@ class Solution:
             return self
         known = replace(known, plain=self.plain, is_solved=self.is_solved)
         if (contact := self.contact) is not None:
-            known = replace(known, is_ended=contact.is_ended, friction=contact.friction_bar, at_edge=contact.at_edge)
+            known = replace(
+                known, is_ended=contact.is_ended, friction_bar=contact.friction_bar, at_edge=contact.at_edge
+            )
             stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
             return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
         stiffness, bars = extrapolate(self.stiffness, self.decrements, self.bars, known, self.unseen)
