@@ -61,6 +61,22 @@ def test_memory_of_a_solve_is_not_underestimated(method):
     assert memory < 1.3 * estimated < 3 * memory
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("rim", [1.5, 0.9])
+@pytest.mark.parametrize("history", [None, {"ramp": "1 s", "hold": "1 s", "steps": 2}], ids=["static", "in time"])
+def test_memory_of_found_contact_and_time_steps_is_that_of_the_plan(history, rim):
+    changes = {
+        "material": {"poisson": 0.4, "law": "neo-hookean"}
+        | ({"relaxation": [{"share": 0.4, "time": "0.5 s"}, {"share": 0.2, "time": "3 s"}]} if history else {}),
+        "probe": {"shape": "sphere", "radius": "4 mm", "depth": "0.5 mm"} | ({"history": history} if history else {}),
+        "mesh": {"rim": f"{rim} mm", "fine": f"{1.2 * rim} mm", "coarse": f"{4 * rim} mm", "growth": 0.4},
+    }
+    code = f"from tests.cases import solve; print(max(r.memory for r in solve(**{changes!r}).values()))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    (planned,) = mesh_steps(make_plan(study(**changes)).solves)
+    assert 0.7 < float(done.stdout) / CostModel().step(planned).memory < 1.3
+
+
 def test_a_step_takes_what_the_largest_of_its_solves_takes():
     """Poisson's ratios of one mesh need other elements; large displacements need matrices."""
     ratios = study(material={"poisson": [0.3, 0.49]}, mesh={"fine": "0.5 mm", "rim": "0.5 mm"})

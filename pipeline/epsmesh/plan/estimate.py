@@ -22,6 +22,9 @@ _OF_BAR = {
     (True, "displacement"): {2: 600, 3: 600, 4: 600},
     (True, "mixed"): {3: 1000, 4: 1000},
 }
+# The same of an error bar for which large contact is found again, in units of that with the area known; and of the
+# stresses, strains and history at the points of large displacements in time steps, for each point of a cell.
+_FOUND_AGAIN, _OF_POINT, _POINTS = 2.3, 1400, {1: 4, 2: 14, 3: 24, 4: 45}
 _OF_FACTOR = {1: 9000, 2: 9000, 3: 10_000}
 # Further bytes per dof of a reduced basis: a multigrid hierarchy for its bound, and five vectors for each of some eight
 # solutions.
@@ -157,12 +160,14 @@ def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool) 
     if direct or way.is_factorised:
         # The fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs.
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
-    return _BASE + _BYTES_PER_DOF[way.is_nonlinear, way.element][degree] * dofs
+    followed = _OF_POINT * _POINTS[degree] / _DOFS_PER_CELL[degree] if way.in_time and way.is_nonlinear else 0.0
+    return _BASE + (_BYTES_PER_DOF[way.is_nonlinear, way.element][degree] + followed) * dofs
 
 
 def error_bar_memory(dofs: float, degree: int, way: Way = PLAIN) -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
+    growth *= _FOUND_AGAIN if way.is_found and way.is_nonlinear else 1.0
     return _BASE + _OF_BAR[way.is_nonlinear, way.element][degree + 1] * growth * dofs
 
 
