@@ -12,8 +12,8 @@ from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
 
-# Right-hand sides solved together.
-_TOGETHER = 64
+# Right-hand sides solved together; in mixed elements each such solve factorises anew.
+_TOGETHER, _TOGETHER_MIXED = 64, 192
 # The solver is direct: its tolerance has no effect.
 _EXACT = 1e-12
 
@@ -48,8 +48,10 @@ class SurfaceBody:
         """Return the compliance (k, k) in m/N, symmetric, of free ``components`` (k, 2): candidates and their axes."""
         nodes, axes = components.T
         found, dofs = np.empty((len(nodes), len(nodes))), self._dofs[nodes, axes]
-        for first in range(0, len(nodes), _TOGETHER):
-            some = dofs[first : first + _TOGETHER]
+        is_mixed = not isinstance(self._solver, DisplacementSolver)
+        together = _TOGETHER_MIXED if is_mixed else _TOGETHER
+        for first in range(0, len(nodes), together):
+            some = dofs[first : first + together]
             loads = np.zeros((self._space.owned, len(some)), order="F")
             here = np.flatnonzero(some >= 0)
             loads[some[here], here] = 1 / self._unit
