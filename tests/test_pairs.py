@@ -9,8 +9,8 @@ from epsmesh.study.capabilities.refusals import REFUSALS
 from tests.pairs import Result, name_of, pairs, run, write_bodies
 
 _EVERY = {name_of(pair): pair for pair in pairs()}
-# F_exact and time steps take seconds, and remeshing a surface one: `make pairs` runs those, too.
-_SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions", "relaxing round scene"}
+# F_exact, time steps and large depths take seconds, and remeshing a surface one: `make pairs` runs those, too.
+_SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions", "relaxing round scene", "2 mm deep"}
 _QUICK = [name for name, pair in _EVERY.items() if not _SLOW & {feature.name for feature in pair}]
 _SAMPLE = random.Random(32).sample(_QUICK, 40)
 _BY_DAY = 16

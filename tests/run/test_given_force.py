@@ -67,7 +67,7 @@ def given(probe, force):
 
 
 # Second variants of a way through the solver.
-BY_NIGHT = ("ball, meridian, large", "paraboloid, meridian", "cone, meridian", "ball, large")
+BY_NIGHT = ("ball, meridian, large", "paraboloid, meridian", "cone, meridian", "ball, large", "blade, large")
 
 
 @pytest.mark.parametrize(

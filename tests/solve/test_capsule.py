@@ -178,7 +178,7 @@ def test_the_force_is_the_derivative_of_the_energy_by_the_depth():
         pytest.param({}, True, "linear", marks=pytest.mark.nightly),
         pytest.param(BALL, True, "linear", marks=pytest.mark.nightly),
         pytest.param({}, True, "neo-hookean", marks=pytest.mark.nightly),
-        (BALL, True, "neo-hookean"),
+        pytest.param(BALL, True, "neo-hookean", marks=pytest.mark.nightly),
     ],
     ids=["bonded", "found", "bonded, taut", "found, taut", "bonded, large", "found, large"],
 )
@@ -264,7 +264,7 @@ def test_tension_decides_where_the_depth_begins():
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("tool", [{}, BALL], ids=["bonded", "found"])
-@pytest.mark.parametrize("only", [False, True], ids=["linear", "large"])
+@pytest.mark.parametrize("only", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["linear", "large"])
 def test_ranks_agree(tool, only):
     material = LARGE if only else {}
     changes = skin(tension_only=only) | {"material": material, "probe": tool}

@@ -71,7 +71,11 @@ def test_a_column_under_its_weight_has_the_length_of_the_closed_form(load, degre
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("degree", "element"),
-    [(2, "displacement"), (2, "mixed"), pytest.param(3, "displacement", marks=pytest.mark.nightly)],
+    [
+        (2, "displacement"),
+        pytest.param(2, "mixed", marks=pytest.mark.nightly),
+        pytest.param(3, "displacement", marks=pytest.mark.nightly),
+    ],
 )
 def test_a_body_that_sagged_is_unloaded_to_what_it_was(degree, element):
     """Loaded to another shape, which is then the image, the body gets its places back, as far as it kept its volume."""
@@ -96,7 +100,7 @@ def test_a_body_that_sagged_is_unloaded_to_what_it_was(degree, element):
     np.testing.assert_array_equal(body.mesh.geometry.x, found.body.imaged)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.nightly)])
 def test_a_ball_meets_the_surface_where_it_is_given(friction):
     probe = BALL | {"friction": friction}
     found = one(probe=probe)
