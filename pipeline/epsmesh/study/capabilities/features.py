@@ -168,6 +168,10 @@ def _is_compressed(scene: Scene) -> bool:
     return scene.body.capsule is not None and not scene.body.capsule.tension_only
 
 
+def _wrinkles(scene: Scene) -> bool:
+    return scene.body.capsule is not None and scene.body.capsule.tension_only
+
+
 def _moves_surface(scene: Scene) -> bool:
     """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
     return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(terms_of(scene)))
@@ -237,6 +241,7 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: _has_edge(s) and not s.probe.is_unilateral
     ),
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
+    "friction that slides": Feature("probe.friction", lambda s: 0 < s.probe.friction < inf, write=_coefficient),
     "inclined touch of a linear law": Feature("probe.axis", touches_inclined, ("body", "material"), list),
     "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
@@ -280,6 +285,7 @@ FEATURES: dict[str, Feature] = {
     "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
     "capsule": Feature("body.capsule", lambda s: s.body.capsule is not None, write=lambda _: None),
     "capsule that bears compression": Feature("body.capsule.tension_only", _is_compressed, write=lambda _: False),
+    "capsule that wrinkles": Feature("body.capsule.tension_only", _wrinkles, write=lambda _: True),
     "tension of the capsule": Feature("body.capsule", _has_tension, write=lambda _: None),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.

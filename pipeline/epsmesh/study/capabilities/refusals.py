@@ -248,6 +248,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "large displacements",
         f"must be true {_OF_LAW}: a membrane that is compressed wrinkles",
     ),
+    Refusal(
+        "friction that slides",
+        "capsule that wrinkles",
+        'does not settle on a capsule that wrinkles under it: omit it, or use friction = "stick"',
+    ),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )
