@@ -137,10 +137,9 @@ def test_its_forces_and_its_tangent_are_derivatives_of_its_energy(tension):
 def test_a_membrane_pressed_far_is_that_of_one_dimension(tension, known):
     """Below a disc as deep as it is wide; ``known`` is from the least energy of an annulus along its radius."""
     body = CYLINDER | {"capsule": SKIN | {"poisson": 0.3, "tension_only": True, "tension": tension}}
-    soft = {"young": "0.1 Pa", "poisson": 0.3, "law": "neo-hookean"}
+    soft = {"young": "1 mPa", "poisson": 0.3, "law": "neo-hookean"}
     found = solved(body=body, material=soft, mesh={"fine": "4 mm", "rim": "0.5 mm"}, probe={"depth": "3 mm"})
-    assert found.force == pytest.approx(known, rel=2e-3)
-    assert abs(found.force / known - 1) < found.force_error
+    assert found.force == pytest.approx(known, rel=3e-4)
 
 
 @pytest.mark.parametrize("ratio", [pytest.param(10, marks=pytest.mark.nightly), 1000])
