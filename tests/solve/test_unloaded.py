@@ -6,11 +6,13 @@ from mpi4py import MPI
 
 from epsmesh import compat
 from epsmesh.plan.key import case_key, mesh_key
+from epsmesh.run import problem as of_case
 from epsmesh.run.fields import variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of
 from epsmesh.run.meshing import mesh_case
-from epsmesh.run.problem import conditions_of, law_of
+from epsmesh.run.problem import conditions_of, law_of, problem_of
 from epsmesh.run.solved import solve_alone, solve_fields
+from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.elements import elements_of
@@ -165,6 +167,23 @@ def test_places_are_those_of_the_given_shape_and_pictures_show_it():
     assert np.linalg.norm(found) > 0.5 * solved.record.largest["unloading"] > moved.max()
     far = np.linalg.norm(fields.points - [20e-3, 20e-3, 0.0], axis=1).argmin()
     assert moved[far] < 0.05e-3
+
+
+def test_a_bar_that_fails_leaves_the_shape_without_load(monkeypatch):
+    """Outputs are bounded in one degree more, on the same mesh; the next depth is then solved on it, too."""
+    case = study(material=SOFT, load=DOWN, body={"is_loaded": "all"}).case(())
+
+    def fails(*_, **__):
+        raise SolveError("no such elements")
+
+    with Spaces(mesh_case(case, (), MPI.COMM_SELF)) as spaces, problem_of(spaces, case) as problem:
+        body = problem.spaces.body
+        free = np.array(body.mesh.geometry.x)
+        assert np.abs(free - body.shown).max() > 1e-4
+        monkeypatch.setattr(of_case, "QuasiStaticProblem", fails)
+        with pytest.raises(SolveError, match="no such elements"):
+            problem_of(problem.spaces, case)
+        np.testing.assert_array_equal(body.mesh.geometry.x, free)
 
 
 def test_a_map_of_the_modulus_is_on_the_given_shape():

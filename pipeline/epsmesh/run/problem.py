@@ -81,7 +81,9 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
             spaces, degree, conditions, case.way.element, tool=tool, reuse=reuse, condense=condense, shape=shape
         )
     except Exception:
-        show_image(spaces.body)
+        if shape is not None:
+            spaces.close()
+            show_image(shape.body)
         raise
 
 
