@@ -96,7 +96,7 @@ wheel-road: ## install and run without root and Debian's packages, from the whee
 slurm-test: setup ## install and start a Slurm of two virtual nodes here, and run the job scripts on it (needs root)
 	$(PYTHON) -m pytest -m slurm $(PYTEST_ARGS) </dev/null
 
-verify: setup ## compare 180 forces with closed forms, published tables and other ways through the program (minutes)
+verify: setup ## compare forces with closed forms, published tables and other ways through the program (minutes)
 	$(PYTHON) -m tests.verification
 
 benchmark: setup ## make the tables of docs/why/performance.md in results/ (on an idle machine, one to two hours)

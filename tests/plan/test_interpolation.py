@@ -22,6 +22,9 @@ from tests.cases import study
 LINE = {"line": {"from": ["-11 mm", "2 mm"], "to": ["9 mm", "3 mm"], "steps": 41}}
 TUMOUR = {"name": "tumour", "at": ["1 mm", "2 mm", "-7 mm"], "radius": "4 mm", "young": "80 kPa", "poisson": 0.3}
 
+BLADE = {"shape": "blade", "radius": None, "length": "6 mm", "width": "0.4 mm"}
+CUTTING = BLADE | {"contact": "unilateral", "toughness": "5 J/m^2", "depth": None, "insertion": {"to": "4 mm"}}
+
 NEAR = TUMOUR | {"at": ["1 mm", "1 mm", "-3.5 mm"], "radius": "2 mm"}
 
 
@@ -38,7 +41,10 @@ def scene(error="1 %", path=LINE, tumour=TUMOUR, **changes):
         "mesh": sizes,
     }
     content |= {"solve": {"exact": False}, "plan": {"path_error": error} if error else {}}
-    return parse(content | {name: content.get(name, {}) | found for name, found in changes.items()})
+    for name, found in changes.items():
+        merged = found if isinstance(found, list) else content.get(name, {}) | found
+        content[name] = merged if isinstance(merged, list) else {k: v for k, v in merged.items() if v is not None}
+    return parse(content)
 
 
 def solved(study, compute_more=lambda plan: compute(plan, MPI.COMM_SELF)):
@@ -140,11 +146,20 @@ def test_what_is_planned_and_what_may_follow():
         ({"solve": {"exact": True}}, "F_exact"),
         ({"probe": {"motion": "all", "contact": "bonded"}}, "6 × 6"),
         ({"material": {"density": "1000 kg/m^3"}, "load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}}, "loads"),
+        ({"probe": {"depth": None, "force": "20 mN"}}, "given force"),
+        ({"probe": {"history": {"ramp": "1 s", "hold": "1 s"}}}, "history"),
+        ({"probe": BLADE | {"contact": "bonded", "incision": "1 mm"}}, "slit"),
+        ({"probe": CUTTING, "body": {"inclusion": None}}, "slit"),  # that it makes
+        ({"body": {"capsule": {"young": "1 MPa", "thickness": "0.1 mm"}}}, "terms"),
+        ({"solve": {"influence": True}}, "influence"),
+        ({"material": {"spread": {"young": "20 %", "correlation_length": "5 mm"}}}, "influence"),
+        ({"output": [{"name": "stress", "region": "tumour", "of": "von_mises"}]}, "outputs"),
     ],
+    ids=str,
 )
 def test_results_that_need_each_solution_have_it_with_the_reason(changes, reason):
     plan = make_plan(scene(**changes))
-    assert len({solve.key for solve in plan.solves if not solve.is_reference}) == 41
+    assert len({tuple(solve.case.frame.point) for solve in plan.solves if not solve.is_reference}) == 41
     assert any(reason in one.reason for one in plan.skipped if one.name == "path")
 
 
