@@ -39,6 +39,11 @@ _VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
         "mesh": {"outside": "coarse"},
     },
     {"material": {"poisson": 0.3, "law": ["linear", "neo-hookean"]}, "solve": {"exact": False}},
+    {
+        "material": {"spread": {"young": "30 %", "correlation_length": "5 mm"}},
+        "mesh": {"outside": "coarse"},
+        "solve": {"exact": False},
+    },
 )
 
 

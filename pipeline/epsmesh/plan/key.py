@@ -94,7 +94,7 @@ def _output_text(output: Output) -> str:
 def _spread_text(case: Case) -> tuple[str, ...]:
     """Return the random fields of the moduli by region, in canonical form; none of a case without."""
     spreads = [tissue.spread for tissue in case.tissues]
-    return (str([spread and text_of(spread) for spread in spreads]),) if any(spreads) else ()
+    return (f"ln F {[spread and text_of(spread) for spread in spreads]}",) if any(spreads) else ()
 
 
 def reference_key(case: Case, accuracy: float) -> str:

@@ -37,16 +37,20 @@ def add_influence(
             dims = (*(axis.name for axis in study.axes), dim)
             found[name] = dims, np.array(values).reshape(*study.shape, -1), attributes(name)
     if any(tissue.spread for case in cases for tissue in case.tissues):
-        found[SPREAD] = _spread(dataset, study, cases, records)
+        found |= _spread(dataset, study, cases, records)
     return dataset.assign(found).assign_coords({dim: (dim, labels[dim], attributes(dim)) for dim in labels})
 
 
 def _spread(
     dataset: xr.Dataset, study: Study, cases: Sequence[Case], records: Sequence[Record | None]
-) -> tuple[Any, ...]:
-    """Return half of the range that holds 95 % of the forces (N), whose logarithm is normally distributed."""
-    deviations = [_known(record, "tissue_spread") or (np.nan,) for record in records]
-    shares = np.sinh(OF_NORMAL * np.array(deviations).reshape(study.shape))
+) -> dict[str, tuple[Any, ...]]:
+    """Return half of the range that holds 95 % of the forces (N), whose logarithm is normally distributed, and its bar.
+
+    The bar has the errors of F, and of the mean and the deviation of ln F.
+    """
+    unknown = (np.nan, np.nan)
+    pairs = [[_known(record, f"tissue_{name}") or unknown for record in records] for name in ("mean", "spread")]
+    (mean, off_mean), (deviation, off_deviation) = np.moveaxis(np.array(pairs), 2, 1).reshape(2, 2, *study.shape)
     named = [
         f"{name} {tissue.spread}"
         for case in cases
@@ -54,8 +58,12 @@ def _spread(
         if tissue.spread
     ]
     dims = [axis.name for axis in study.axes]
-    values = abs(dataset["force"].transpose(*dims).values) * shares
-    return dims, values, attributes(SPREAD) | {"comment": "; ".join(dict.fromkeys(named))}
+    force, bar = (abs(dataset[name].transpose(*dims).values) for name in ("force", "force_error"))
+    wide = OF_NORMAL * deviation
+    values = force * np.exp(mean) * np.sinh(wide)
+    error = values * np.sqrt((bar / force) ** 2 + off_mean**2 + (OF_NORMAL * off_deviation / np.tanh(wide)) ** 2)
+    of_values = attributes(SPREAD) | {"comment": "; ".join(dict.fromkeys(named))}
+    return {SPREAD: (dims, values, of_values), f"{SPREAD}_error": (dims, error, attributes(f"{SPREAD}_error"))}
 
 
 def _known(record: Record | None, name: str) -> tuple[float, ...] | None:

@@ -92,18 +92,21 @@ def _like(force: xr.DataArray, other: xr.DataArray) -> xr.DataArray:
 class Bar:
     """An error bar of F: its ``cause``, its largest ``share`` of F over the cases, and where it is from.
 
-    A share that is not a number is not computed. ``said`` is what makes it smaller, if it is the largest.
+    A share that is not a number is not computed. ``said`` is what makes it smaller, if it is the largest. ``error`` is
+    the bar of the bar, a share of F, too, if it has one.
     """
 
     cause: str
     share: float
     said: str
     source: str = ""
+    error: float = nan
 
     @property
     def size(self) -> str:
         """The share as people read it."""
-        return f"± {percent(self.share)}" if isfinite(self.share) else "not computed"
+        own = f" (itself ± {percent(self.error)})" if isfinite(self.error) else ""
+        return f"± {percent(self.share)}{own}" if isfinite(self.share) else "not computed"
 
 
 def bars(dataset: xr.Dataset) -> list[Bar]:
@@ -113,7 +116,8 @@ def bars(dataset: xr.Dataset) -> list[Bar]:
         if name in dataset:
             source = str(dataset[name].attrs.get("comment", "")) if name != "force_error" else ""
             subject = _within(dataset) if name == SPREAD else source.partition(" from ")[0]
-            found.append(Bar(cause, _largest(dataset, name), said.format(subject), source))
+            error = _largest(dataset, f"{name}_error") if f"{name}_error" in dataset else nan
+            found.append(Bar(cause, _largest(dataset, name), said.format(subject), source, error))
     return found
 
 

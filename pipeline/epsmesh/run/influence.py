@@ -13,7 +13,7 @@ from epsmesh import compat
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.steps import Solve
-from epsmesh.run.spread import deviation_of
+from epsmesh.run.spread import logarithm_of
 from epsmesh.shapes.contact import place_of_touch
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.points.locate import table_of
@@ -38,7 +38,7 @@ def sums_of_influence(
 ) -> Mapping[str, tuple[float, ...]]:
     """Return share of F by region, and distance (m) by share of F, with error bars, by their names; collective.
 
-    If moduli are random fields, ``tissue_spread`` is the standard deviation of ln F.
+    If moduli are random fields, ``tissue_spread`` is the standard deviation of ln F, ``tissue_mean`` its mean.
 
     The mesh is that of the solver, turned so that the probe presses along −z. ``contact_error`` is the relative error
     bar of the contact radius: two degrees may have the same nodes in contact, and F another share where it is wider.
@@ -82,7 +82,9 @@ def sums_of_influence(
     values = {name: value for name, (value, _) in found.items()}
     values |= {f"{name}_error": bar if is_known else np.full_like(bar, np.nan) for name, (_, bar) in found.items()}
     spreads = [tissue.spread for tissue in case.tissues]
-    values |= {"tissue_spread": (deviation_of(state, numbers, spreads),)} if any(spreads) else {}
+    if any(spreads):
+        ln = logarithm_of(state, finer, numbers, spreads, contact_error)
+        values |= {"tissue_mean": (ln.mean, ln.mean_error), "tissue_spread": (ln.deviation, ln.deviation_error)}
     return {name: tuple(map(float, numbers)) for name, numbers in values.items()}
 
 
