@@ -49,3 +49,28 @@ def test_deep_bonded_tools_are_not_pressed_on_the_meridian():
     assert is_round(case(material=law, probe={"depth": "0.7 mm"}))
     assert not is_round(case(material=law, probe={"depth": "0.8 mm"}))
     assert is_round(case(probe={"depth": "0.8 mm"}))
+
+
+@pytest.mark.parametrize(
+    ("formula", "expected"),
+    [
+        ("10 kPa*(1 + r/(20 mm) - z/(9 mm))", True),
+        ("10 kPa*(1 + (y*y + x^2)/(20 mm)^2)", True),
+        ("10 kPa*(1 + sqrt(x**2 + y**2)/(20 mm))", True),
+        ("10 kPa*(1 + x^2/(20 mm)^2 + r/(20 mm))", False),
+        ("10 kPa*(1 + (x^2 + x^2)/(20 mm)^2)", False),
+        ("10 kPa*(1 + (x^2 - y^2)/(90 mm)^2)", False),
+    ],
+)
+def test_formulas_of_r_and_z_are_round(formula, expected):
+    field = {"young": {"formula": formula}}
+    assert is_round(case(material=field)) is expected
+    assert is_round(case(body={"layer": [SKIN | field]})) is expected
+    assert not is_round(case(material=field, probe={"at": ["1 mm", "0 mm"]}))
+
+
+def test_a_layer_that_is_stiffer_where_the_support_begins_is_not_round():
+    """A field counts with its value there, at r = 20 mm."""
+    soft, stiff = ({"young": {"formula": f"5 kPa*(1 + {factor}*(r/(20 mm))^4)"}} for factor in (0.1, 3))
+    assert is_round(case(body={"layer": [SKIN | soft], "fixed": {"below": "-2 mm"}}))
+    assert not is_round(case(body={"layer": [SKIN | stiff], "fixed": {"below": "-2 mm"}}))

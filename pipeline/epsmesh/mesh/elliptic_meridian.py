@@ -16,6 +16,7 @@ from epsmesh import compat
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.mesh.boxes import halve_boxes, triangulate
 from epsmesh.mesh.meridian import AXIS, KINK, Grading, MeridianArrays, mildness, name_edges, ratio
+from epsmesh.mesh.round_fields import Resolution, RoundField
 from epsmesh.scene.model import FIXED, FREE, PROBE
 
 # Degree of the sides on the surface.
@@ -30,7 +31,7 @@ class EllipticMeridian:
 
     ``radius`` is its semi-axis across z, ``semi_height`` that along z. Its surface is fixed below the level
     z = ``fixed``. The footprint is the part that projects along z into the disc of ``probe_radius``. ``kinks`` are
-    radii (m) within it at which the prescribed displacement is not smooth.
+    radii (m) within it at which the prescribed displacement is not smooth. ``fields`` has that of its stiffness.
 
     Raises:
         ValueError: if that disc is as wide as the body.
@@ -41,6 +42,7 @@ class EllipticMeridian:
     probe_radius: float
     fixed: float
     kinks: tuple[float, ...] = ()
+    fields: tuple[RoundField | None, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise an error for a footprint without an edge."""
@@ -58,7 +60,7 @@ class EllipticMeridian:
         """Mesh the half plane: the same input gives the same arrays, bit for bit."""
         start = time.perf_counter()
         outline = _Outline.of(self)
-        points, cells, _ = triangulate(_boxes(outline, grading))
+        points, cells, _ = triangulate(_boxes(outline, grading, Resolution(self.fields, self.unit, outline.place)))
         groups = name_edges(outline.sides, points)
         (centre,) = np.nonzero(points[:, 1] == -1)
         one = np.arange(len(points))
@@ -71,7 +73,8 @@ class EllipticMeridian:
         number[cells] = bent[:, :3]
         facets = {name: number[one[edges]] for name, edges in groups.items()}
         regions, places = np.zeros(len(cells), dtype=np.int64), np.array([place for _, place, _ in outline.singular])
-        return MeridianArrays(nodes, bent, regions, facets, places, self.unit, time.perf_counter() - start, ORDER)
+        seconds = time.perf_counter() - start
+        return MeridianArrays(nodes, bent, regions, facets, places, self.unit, seconds, ORDER, self.fields)
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class _Outline:
         return np.stack([r, z], axis=-1)
 
 
-def _boxes(outline: _Outline, grading: Grading) -> FloatArray:
+def _boxes(outline: _Outline, grading: Grading, resolution: Resolution) -> FloatArray:
     """Halve the half plane along the side of each box that is longer in space, until all are small enough."""
     most = grading.cap * min(outline.radius, outline.height)
     marks = [np.unique([0.0, outline.probe, outline.support, pi, *outline.kinks]), np.array([-1.0, 0.0])]
@@ -137,7 +140,10 @@ def _boxes(outline: _Outline, grading: Grading) -> FloatArray:
         wide = (high - low) * (1 + outer) * np.hypot(outline.radius * cosine, outline.height * sine)
         deep = (outer - inner) * np.hypot(outline.radius * sine, outline.height * cosine)
         is_wide = high - low > _WIDEST * grading.growth
-        return (np.maximum(wide, deep) > size) | is_wide, (deep > wide) & ~is_wide
+        longest = np.maximum(wide, deep)
+        large = (longest > size) | is_wide
+        large[~large] = resolution.large(boxes[~large], longest[~large], np.zeros(np.sum(~large), dtype=int))
+        return large, (deep > wide) & ~is_wide
 
     return halve_boxes(np.array([(0.0, pi, -1.0, 0.0)]), marks, judge)
 

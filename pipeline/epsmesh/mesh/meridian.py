@@ -9,11 +9,11 @@ ten metres give the same mesh.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot, inf, isqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -22,6 +22,7 @@ from epsmesh import compat
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.boxes import halve_boxes, triangulate
 from epsmesh.mesh.distribute import exterior_facets
+from epsmesh.mesh.round_fields import Resolution, RoundField
 from epsmesh.scene.model import CUT, FIXED, FREE, PROBE
 from epsmesh.shapes.support import HeldOnHalfPlane
 
@@ -70,7 +71,8 @@ class MeridianArrays:
 
     ``points`` (n, 2) are (r, z), ``cells`` (m, 3) the triangles, ``regions`` (m,) their region numbers. ``facets`` maps
     the name of a boundary group to its edges (k, 2). ``singular`` (s, 2) are the points to which the mesh is graded.
-    With a higher ``order`` cells have more nodes, corners first, in the order of the elements.
+    With a higher ``order`` cells have more nodes, corners first, in the order of the elements. ``fields`` are those of
+    the regions by number.
     """
 
     points: FloatArray
@@ -81,6 +83,20 @@ class MeridianArrays:
     unit: float
     seconds: float
     order: int = 1
+    fields: tuple[RoundField | None, ...] = ()
+
+    def field_of(self, region: int) -> Callable[[FloatArray], FloatArray] | None:
+        """Return the field of a region, at points (n, 2) of the mesh; None if its stiffness is constant."""
+        field = self.fields[region] if self.fields else None
+        return None if field is None else lambda points: field.at(self.unit * points)
+
+
+class RegionMesh(NamedTuple):
+    """The dolfinx ``mesh`` of a region on this process alone, the ``facets`` of each group, and its ``field``."""
+
+    mesh: Any
+    facets: dict[str, Int32Array]
+    field: Callable[[FloatArray], FloatArray] | None = None
 
 
 @dataclass(frozen=True)
@@ -92,7 +108,7 @@ class Meridian:
     heights z (m), from the top down, between layers, which are regions 1, 2, ... of the mesh. The part below all of
     them is another layer if ``is_filled``, else region 0. ``kinks`` are radii (m) within the disc at which the
     prescribed displacement is not smooth. The rings ``lost``, pairs of radii (m) from the innermost on, are not in
-    contact.
+    contact. ``fields`` are those of the stiffness of the regions by number, none if it is constant.
     """
 
     radius: float
@@ -105,6 +121,7 @@ class Meridian:
     is_filled: bool = False
     kinks: tuple[float, ...] = ()
     lost: tuple[tuple[float, float], ...] = ()
+    fields: tuple[RoundField | None, ...] = ()
 
     @property
     def is_cut(self) -> bool:
@@ -141,12 +158,17 @@ class Meridian:
         singular = _singular_points(self)
         boxes = _boxes(self, singular, grading)
         points, cells, box = triangulate(boxes)
-        layer = np.sum(boxes[box, 2, None] < np.array(_interfaces(self)), axis=1)  # number of interfaces above it
-        regions = np.where((layer < len(self.interfaces)) | self.is_filled, layer + 1, 0)
+        regions = self.regions_of(boxes)[box]
         corners, groups = _outline(self)
         facets = name_edges(list(zip(corners, [*corners[1:], corners[0]], groups, strict=True)), points)
         places = np.array([(r, z) for r, z, _ in singular]).reshape(-1, 2)
-        return MeridianArrays(points, cells, regions, facets, places, self.unit, time.perf_counter() - start)
+        seconds = time.perf_counter() - start
+        return MeridianArrays(points, cells, regions, facets, places, self.unit, seconds, fields=self.fields)
+
+    def regions_of(self, boxes: FloatArray) -> IntArray:
+        """Return the region number (n,) of boxes (n, 4) of the half plane."""
+        layer = np.sum(boxes[:, 2, None] < np.array(_interfaces(self)), axis=1)  # number of interfaces above it
+        return np.where((layer < len(self.interfaces)) | self.is_filled, layer + 1, 0)
 
 
 def split_regions(arrays: MeridianArrays) -> dict[int, MeridianArrays]:
@@ -170,10 +192,10 @@ def _part(arrays: MeridianArrays, chosen: BoolArray) -> MeridianArrays:
     )
 
 
-def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
-    """Return the dolfinx mesh of ``arrays`` on this process alone, and the facets of each group.
+def meridian_mesh(arrays: MeridianArrays) -> RegionMesh:
+    """Return the mesh of ``arrays`` on this process alone, and the facets of each group.
 
-    Boundary edges without a group are interfaces with other regions.
+    Boundary edges without a group are interfaces with other regions. The field is that of the first cell's region.
     """
     mesh = compat.create_mesh(MPI.COMM_SELF, arrays.cells, arrays.points, arrays.order)
     exterior, ends = exterior_facets(mesh)
@@ -181,7 +203,8 @@ def meridian_mesh(arrays: MeridianArrays) -> tuple[Any, dict[str, Int32Array]]:
     facets = {
         name: exterior[np.isin(ends @ key, np.sort(edges, axis=1) @ key)] for name, edges in arrays.facets.items()
     }
-    return mesh, facets | {JOINT: np.setdiff1d(exterior, np.concatenate([*facets.values()]))}
+    facets[JOINT] = np.setdiff1d(exterior, np.concatenate([*facets.values()]))
+    return RegionMesh(mesh, facets, arrays.field_of(int(arrays.regions[0])))
 
 
 def name_edges(sides: Sequence[tuple[Corner, Corner, str]], points: FloatArray) -> dict[str, IntArray]:
@@ -273,6 +296,7 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
     marks = [np.unique([*corners[:, 0], *kinks]), np.unique([*corners[:, 1], *ends])]
     # Boxes smaller than the distances between marks have all of the marks among their corners.
     least = min(np.diff(m).min() for m in marks) / 4
+    resolution = Resolution(meridian.fields, meridian.unit)
 
     def judge(boxes: FloatArray) -> tuple[BoolArray, BoolArray]:
         r0, r1, z0, z1 = boxes.T
@@ -280,7 +304,10 @@ def _boxes(meridian: Meridian, singular: list[tuple[float, float, float]], gradi
         for r, z, factor in singular:
             distance = np.hypot(np.maximum(np.maximum(r0 - r, r - r1), 0), np.maximum(np.maximum(z0 - z, z - z1), 0))
             size = np.minimum(size, grading.near(distance, factor, least))
-        return np.maximum(r1 - r0, z1 - z0) > size, z1 - z0 > r1 - r0
+        longest = np.maximum(r1 - r0, z1 - z0)
+        large = longest > size
+        large[~large] = resolution.large(boxes[~large], longest[~large], meridian.regions_of(boxes[~large]))
+        return large, z1 - z0 > r1 - r0
 
     layers = [(0.0, r_end, low, high) for high, low in pairwise(ends)]
     return halve_boxes(np.array(layers), marks, judge)

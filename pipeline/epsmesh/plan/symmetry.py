@@ -6,8 +6,11 @@ Each shape declares its own symmetry; the default is none.
 from functools import lru_cache
 from itertools import pairwise
 
+import numpy as np
+
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.probe import PLANES, Probe
+from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.capabilities.obstacles import obstacle
 from epsmesh.study.case import Case
 
@@ -65,8 +68,18 @@ def _is_held_below_stiffer(case: Case) -> bool:
     """
     level, interfaces = case.body.support.on_half_plane(), case.body.interfaces
     layers = [*case.tissues[1:], case.tissues[0]][: len(interfaces) + 1]
+
+    def is_stiffer(above: Tissue, below: Tissue, z: float) -> bool:
+        place = np.array([[case.reach, 0.0, z]])
+        of_fields = (
+            1.0 if one.varying is None else float(one.varying.relative(one.varying.at(place))[0])
+            for one in (above, below)
+        )
+        first, second = (one.lame[1] * factor for one, factor in zip((above, below), of_fields, strict=True))
+        return first > _STIFFER * second
+
     return any(
-        isinstance(level, float) and abs(z - level) <= _SAME * abs(z) and above.lame[1] > _STIFFER * below.lame[1]
+        isinstance(level, float) and abs(z - level) <= _SAME * abs(z) and is_stiffer(above, below, z)
         for z, (above, below) in zip(interfaces, pairwise(layers), strict=True)
     )
 

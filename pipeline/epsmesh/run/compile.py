@@ -61,6 +61,7 @@ class _Meridian:
     lowest: int = 0
     laws: tuple[str, ...] = LINEAR
     relaxes: bool = False
+    varies: bool = False
 
     def compile(self) -> None:
         compile_axisymmetric(**vars(self))
@@ -123,5 +124,5 @@ def _forms(solve: Solve) -> _Forms:
     curved = bool(half_plane and half_plane.is_curved)
     if way.is_large or way.in_time:
         degree = DEGREE_OF_STEPS if way.rubs else LARGE_DEGREE
-        return _Meridian(curved, degree, laws=way.laws, relaxes=way.in_time)
-    return _Meridian(curved, lowest=_LOWEST.get(way.constraint, 0))
+        return _Meridian(curved, degree, laws=way.laws, relaxes=way.in_time, varies=case.varies)
+    return _Meridian(curved, lowest=_LOWEST.get(way.constraint, 0), varies=case.varies)

@@ -78,3 +78,34 @@ def variation_of(case: Case) -> Variation | None:
     )
     turn = case.frame.turn
     return Variation(fields, None if turn is None else tuple(map(tuple, turn.tolist())))
+
+
+@dataclass(frozen=True)
+class HalfPlaneField:
+    """A ``field`` of a round scene in its half plane, whose origin is at the height ``top`` (m) of the body."""
+
+    field: TissueField
+    top: float
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Return the relative values at ``points`` (n, 2), r and z in m.
+
+        Raises:
+            SolveError: if one is not positive.
+        """
+        places = np.insert(points, 1, 0.0, axis=1) + np.array([0.0, 0.0, self.top])
+        values = self.field.at(places)
+        is_wrong = ~(values > 0) | ~np.isfinite(values)
+        if is_wrong.any():
+            first = int(is_wrong.argmax())
+            raise SolveError(self.field.refusal(places[first], float(values[first])))
+        return values
+
+
+def half_plane_fields(case: Case) -> tuple[HalfPlaneField | None, ...]:
+    """Return the fields of the regions of a round ``case``, in its half plane; none if all moduli are constant."""
+    variation = variation_of(case)
+    return tuple(
+        HalfPlaneField(field, case.frame.point[2]) if isinstance(field, TissueField) else None
+        for field in (variation.fields if variation else ())
+    )

@@ -12,7 +12,7 @@ from epsmesh.plan import estimate
 from epsmesh.plan.symmetry import slides_across
 from epsmesh.plan.thin import cause
 from epsmesh.run.far_field import far_field_of, far_field_seconds
-from epsmesh.run.fields import variation_of
+from epsmesh.run.fields import half_plane_fields, variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
 from epsmesh.shapes.contact import first_touch, normal_at_touch
@@ -104,15 +104,16 @@ def meridian_problem(case: Case) -> Problem:
     """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
     if crack := case.probe.crack:
         return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
+    half_plane = replace(meridian_of(case), fields=half_plane_fields(case))
     match case.way.is_found, case.way.has_steps:
         case True, True:
             how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
-            return LargeMeridianContact(meridian_of(case), round_tool_of(case), **how)
+            return LargeMeridianContact(half_plane, round_tool_of(case), **how)
         case True, False:
-            return MeridianContact(meridian_of(case), round_tool_of(case))
+            return MeridianContact(half_plane, round_tool_of(case))
         case False, True:
-            return LargeMeridian(meridian_of(case), conditions_of(case))
-    return MeridianProblem(meridian_of(case), conditions_of(case))
+            return LargeMeridian(half_plane, conditions_of(case))
+    return MeridianProblem(half_plane, conditions_of(case))
 
 
 def conditions_of(case: Case) -> Conditions:

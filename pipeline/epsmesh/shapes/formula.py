@@ -99,6 +99,11 @@ class Formula:
         """Return whether it certainly is its own image in the plane where a coordinate is zero: 0 for x, 1 for y."""
         return _is_even(self._parsed[0], COORDINATES[axis])
 
+    @property
+    def is_round(self) -> bool:
+        """Whether it certainly is of r and z alone: x and y occur in x^2 + y^2 only."""
+        return _is_round(self._parsed[0])
+
     def _evaluated(self, points: FloatArray) -> _Value:
         tree, quantities = self._parsed
         x, y, z = points.T
@@ -181,6 +186,25 @@ def _is_even(node: ast.AST, name: str) -> bool:
         case ast.Call(func=ast.Name(id="abs"), args=[ast.Name()]):
             return True
     return all(_is_even(part, name) for part in ast.iter_child_nodes(node))
+
+
+def _is_round(node: ast.AST) -> bool:
+    match node:
+        case ast.Name(id="x" | "y"):
+            return False
+        case ast.BinOp(op=ast.Add(), left=left, right=right) if {_squared(left), _squared(right)} == {"x", "y"}:
+            return True
+    return all(map(_is_round, ast.iter_child_nodes(node)))
+
+
+def _squared(node: ast.AST) -> str:
+    """Return the name whose square a node is, "" if it is none."""
+    match node:
+        case ast.BinOp(left=ast.Name(id=name), op=ast.Pow(), right=ast.Constant(value=2 | 2.0)):
+            return name
+        case ast.BinOp(left=ast.Name(id=name), op=ast.Mult(), right=ast.Name(id=other)) if name == other:
+            return name
+    return ""
 
 
 def _depth(tree: ast.AST) -> int:

@@ -162,6 +162,11 @@ class Varying(Section):
         axes = [axis for axis, part in enumerate(normal) if part]
         return self.kind == "formula" and len(axes) == 1 and axes[0] < 2 and self._values.is_mirrored(axes[0])
 
+    @property
+    def is_round(self) -> bool:
+        """Whether it certainly is a formula of r and z alone."""
+        return self.kind == "formula" and bool(self._values.is_round)
+
     def at(self, points: FloatArray) -> FloatArray:
         """Return the moduli (Pa) at ``points`` (n, 3), m, without the factor ``scale``; NaN where there is none."""
         return np.asarray(self._values.at(points))

@@ -177,6 +177,7 @@ class _Search:
         error += patch.off**2 * fine.stiffness * depth / force
         with stage("solve"):
             solution = depth * fine.punch + fine.pressed
+            error += fine.forms.unresolved(solution)
             residual = fine.forms.residual(solution)
             check_signs(fine.forms, arrays, solution, residual, tool=self._tool, depth=depth)
             strain = max_strain(fine.forms, arrays) / arrays.unit

@@ -196,6 +196,7 @@ class LargeMeridian(LargeSolver):
             error_bar(coarse_force, -on_probe, self._degree, balance),
             error_bar(coarse_energy, energy, self._degree, balance),
         )
+        error += fine.forms.unresolved(state)
         if before is None:
             error *= _FIRST_MESH
         else:

@@ -93,6 +93,7 @@ class LargeMeridianContact(LargeSolver):
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
         error = float(_OF_RESULTS[0] * bars[0]) / fine.results[0] + fine.resolution**2 + 3 * balance
+        error += fine.tissue.system.forms.unresolved(fine.tissue.state)
         return _ContactAnswer(
             stiffness=force / deep,
             on_probe=-force / deep,

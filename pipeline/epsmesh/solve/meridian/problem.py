@@ -213,7 +213,8 @@ class MeridianProblem(MeridianSolver):
             stiffness=fine.twice_energy,
             on_probe=force,
             balance=fine.balance,
-            error=error_bar(coarse_force, force, self._degree, max(coarse.balance, fine.balance)),
+            error=error_bar(coarse_force, force, self._degree, max(coarse.balance, fine.balance))
+            + system.forms.unresolved(fine.solution),
             unit=arrays.unit,
             max_strain=abs(depth) / arrays.unit * strain,
             dofs=system.forms.dofs,
@@ -229,6 +230,7 @@ def compile_axisymmetric(
     lowest: int = 0,
     laws: Sequence[str] = ("linear",),
     relaxes: bool = False,
+    varies: bool = False,
 ) -> None:
     """Compile every form of a meridian with these laws, on this process; call it within ``compiling()``.
 
@@ -237,8 +239,9 @@ def compile_axisymmetric(
     terms: Terms = ((0.5, 1.0),) if relaxes else ()
     example: HalfPlane = EllipticMeridian(2.0, 2.0, 1.0, 0.0) if curved else Meridian(2.0, 1.0, 1.0)
     mesh = meridian_mesh(example.mesh(Grading(1.0)))
-    for law, poisson in product(laws, (0.0, 0.5)):
+    meshes = [mesh, mesh._replace(field=lambda points: np.ones(len(points)))][: 1 + varies]
+    for law, poisson, region in product(laws, (0.0, 0.5), meshes):
         further = dict.fromkeys(LAWS[law].parameters, 1.0)
         for p in range(lowest or degree - 1, degree + 1):
             tissue = Parameters.of_moduli(1.0, poisson, law, further)
-            MeridianForms({0: mesh}, p, MaterialLaw((replace(tissue, relaxation=terms),)))
+            MeridianForms({0: region}, p, MaterialLaw((replace(tissue, relaxation=terms),)))

@@ -7,6 +7,7 @@ strain the energy is that of a unit of thickness.
 Tissue that relaxes has the energy A ψ + H : E of :mod:`epsmesh.solve.relaxing`, with H at the quadrature points.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -17,8 +18,8 @@ import ufl
 from dolfinx import fem
 
 from epsmesh import compat
-from epsmesh.arrays import FloatArray, Int32Array, IntArray
-from epsmesh.mesh.meridian import mesh_order
+from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.mesh.meridian import RegionMesh, mesh_order
 from epsmesh.solve.compiled import cellwise_space, form, quadrature_space, taylor_hood_space, vector_space
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.laws.law import Energy
@@ -46,15 +47,19 @@ _MORE = 2
 # Quadrature degree of the points where tissue must not be inside out: many more than carry the energy, since an element
 # at the probe's edge may fold between those.
 _INSIDE = 20
+# Quadrature degree that is added to see what is not resolved of a field.
+_FINER = 7
 
 
 class Region:
-    """Elements of one ``degree`` on a mesh of one ``material``, with moduli in units of ``unit`` (Pa)."""
+    """Elements of one ``degree`` on a mesh of one ``material``, with moduli in units of ``unit`` (Pa).
+
+    Volume counts as if it were as many times as large as the field of the stiffness is there.
+    """
 
     def __init__(
         self,
-        mesh: Any,
-        facets: dict[str, Int32Array],
+        of: RegionMesh,
         degree: int,
         material: Parameters,
         unit: float,
@@ -66,7 +71,8 @@ class Region:
 
         Tissue that ``relaxes`` has A and H.
         """
-        self._mesh, self._facets, self._is_plane = mesh, facets, is_plane
+        self._mesh, self._facets, self._is_plane = of.mesh, of.facets, is_plane
+        mesh = self._mesh
         self._material, self._unit, self._degree = material, unit, degree
         self.is_linear = material.law == "linear"
         self.is_mixed = material.poisson >= (MIXED_FROM if self.is_linear else LARGE_MIXED_FROM)
@@ -83,12 +89,27 @@ class Region:
         exact = 2 * degree + mesh_order(mesh)
         quadrature = exact if self.is_linear else exact + _MORE
         self._dx = ufl.dx(metadata={"quadrature_degree": quadrature})
+        finer, within = None, self._weight
+        if of.field is not None:
+            finer = self._factors(of.field, quadrature + _FINER)
+            self._weight = within * self._factors(of.field, quadrature)[0]
         self._history = _History(mesh, quadrature) if relaxes else None
         self._density = self._linear(self._strain) if self.is_linear else self._hyperelastic(self._gradient)
+        self._more = None if finer is None else form(self._density.value * within * finer[0] * finer[1])
         directions = ufl.TestFunction(self._space), ufl.TrialFunction(self._space)
         self._action, self._stiffness = (form(self._derivative(*directions[:order])) for order in (1, 2))
         # All forms are compiled now.
         _ = self._strains, self._areas, (self.is_linear and not relaxes) or self._energies, relaxes and self._at_points
+        _ = self._more is None or self._energies
+
+    def _factors(self, field: Callable[[FloatArray], FloatArray], quadrature: int) -> tuple[Any, Any]:
+        """Return the values of a ``field`` of the stiffness at the points of a ``quadrature``, and its measure."""
+        space, measure = quadrature_space(self._mesh, quadrature, 3), ufl.dx(metadata={"quadrature_degree": quadrature})
+        test, (r, z) = ufl.TestFunction(space), ufl.SpatialCoordinate(self._mesh)
+        sums = fem.assemble_vector(form(ufl.inner(ufl.as_vector([r, z, 1.0]), test) * measure)).array.reshape(-1, 3)
+        factors = fem.Function(space)
+        factors.x.array.reshape(-1, 3)[:, 0] = field(sums[:, :2] / sums[:, 2:])
+        return factors[0], measure
 
     def _derivative(self, *directions: Any) -> Any:
         """Return the derivative of the energy along ``directions``."""
@@ -179,6 +200,13 @@ class Region:
         """Return the energy of a ``solution``, NaN if tissue is inside out at a point of quadrature."""
         self._solution.x.array[:] = solution
         return sum(float(fem.assemble_scalar(each)) for each in self._energies)
+
+    def unresolved(self, solution: FloatArray) -> float:
+        """Return the change of the energy of a ``solution`` with more points of quadrature for the field."""
+        if self._more is None:
+            return 0.0
+        self._solution.x.array[:] = solution
+        return float(fem.assemble_scalar(self._more)) - float(fem.assemble_scalar(self._energies[0]))
 
     @cached_property
     def _energies(self) -> list[Any]:

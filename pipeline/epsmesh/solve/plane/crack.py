@@ -8,13 +8,13 @@ Lengths are in units of half the crack's length b, stresses in units of μ.
 """
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from epsmesh.arrays import BoolArray, FloatArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.mesh.cracked import ACROSS, AHEAD, FACE, CrackGrading, cracked_quarter
-from epsmesh.mesh.meridian import meridian_mesh
+from epsmesh.mesh.meridian import RegionMesh, meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, reach_contact
@@ -122,7 +122,7 @@ def _opening(found: list[_OpenCrack]) -> Opening:
     return Opening(ratios, energies, slopes, thrusts, angles)
 
 
-def _tissue(mesh: tuple[Any, dict[str, Int32Array]], law: MaterialLaw) -> MeridianTissue:
+def _tissue(mesh: RegionMesh, law: MaterialLaw) -> MeridianTissue:
     """Return the quarter of the plane at rest, seen from the nodes of the crack's face, from its middle to its tip."""
     with stage("assembly"):
         forms = MeridianForms({0: mesh}, DEGREE, law, is_plane=True)

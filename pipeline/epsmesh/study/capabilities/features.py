@@ -224,6 +224,9 @@ FEATURES: dict[str, Feature] = {
     ),
     "fibres": _of_tissue("law", lambda tissue: tissue.has_fibres),
     "varying stiffness": _of_tissue("young", lambda tissue: tissue.varying is not None, write=lambda _: None),
+    "stiffness that is not round": _of_tissue(
+        "young", lambda tissue: tissue.varying is not None and not tissue.varying.is_round, write=lambda _: None
+    ),
     "spread": _of_tissue("spread", lambda tissue: tissue.spread is not None, write=lambda _: None),
     # Of regions, those of layers that fill the body included, the study's check of laws reports it.
     "ν < 0.2": Feature(

@@ -13,7 +13,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "linear outside": "the boundary of the linear part is a sphere, and no line of the mesh of the meridian",
         "six motions": "most of the six motions are not axisymmetric",
         "half ball": "a half ball is coupled to its far field in three dimensions",
-        "varying stiffness": "a field of the modulus is computed in three dimensions",
+        "stiffness that is not round": "only a formula of r and z alone is axisymmetric",
         "loads": "loads are computed in three dimensions",
         "terms": "terms are computed in three dimensions",
         "inclined touch of a linear law": "contact off the tool's axis is computed in three dimensions",
