@@ -9,6 +9,7 @@ from epsmesh_identify.estimation.parts import CurveFit, Estimate, NoiseEstimate,
 STUDY = '[material]\nyoung = "1 kPa"\nlaw = "linear"\n'
 UNKNOWNS = (
     Unknown("young", 1e3, 1e6, "Pa", is_logarithmic=True),
+    Unknown("scale", 0.1, 10.0, "1", is_logarithmic=True),
     Unknown("poisson", 0.2, 0.5, "1"),
     Unknown("skin_young", 1e3, 1e6, "Pa", is_logarithmic=True),
     Unknown("skin_thickness", 1e-4, 1e-2, "m", is_logarithmic=True),
@@ -19,6 +20,7 @@ UNKNOWNS = (
 # Estimate, and the ends of both bars.
 VALUES = {
     "young": (12e3, 11.4e3, 12.6e3, 10e3, 14e3),
+    "scale": (1.3, 1.26, 1.34, 1.0, 1.7),
     "poisson": (0.4, 0.37, 0.43, 0.3, 0.44),
     "skin_young": (90e3, 85e3, 95e3, 80e3, 99e3),
     "skin_thickness": (1e-3, 0.95e-3, 1.05e-3, 0.9e-3, 1.1e-3),

@@ -40,10 +40,10 @@ _TEXTS = {
     "an error.",
     "measurement.sign": "Signs of recorded values. Optional; a sign that is not given is found, and reported.",
     "identify": "Unknowns that `epsmesh identify` finds from the measurements. Besides the keys below, the name of a "
-    "parameter is a key: `young`, `poisson`, `thickness`, `radius`, `friction`, `skin_young`, `skin_thickness`, a "
-    "parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, `machine_stiffness`, "
-    "`relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). What is not named is "
-    "known. Optional; its lists are no sweeps.",
+    "parameter is a key: `young`, of a field `scale`, its factor, `poisson`, `thickness`, `radius`, `friction`, "
+    "`skin_young`, `skin_thickness`, a parameter of the law, `contact_point` (larger is deeper), `baseline`, `drift`, "
+    "`machine_stiffness`, `relaxation_share_1`, `relaxation_time_1`. It has a range, or a value with its error (95 %). "
+    "What is not named is known. Optional; its lists are no sweeps.",
     "sensitivity": "Parameters whose effect on the force `epsmesh run` compares, after the cases. Besides the key "
     "below, the name of a parameter is a key, as in [identify], and `depth`: it has a range, or a value with its error "
     "(95 %). Forces do not depend on this section. Optional; its lists are no sweeps.",

@@ -253,6 +253,8 @@ def _table(path: str, dataset: "xr.Dataset") -> dict[str, Any]:
         _UnusableError: if a parameter is not in the curves.
     """
     tissue = [name for name in map(str, dataset["unknown"].values) if not is_of_test(name)]
+    if scales := [name for name in tissue if name.rpartition("_")[2] == "scale"]:
+        raise _UnusableError(f"{', '.join(scales)} cannot be passed on: write it into the table of the field")
     if not any(name == "young" or name.endswith("_young") for name in tissue):
         raise _UnusableError("has no `young`: identify it")
     own = dataset.sel(unknown=tissue, unknown_2=tissue)

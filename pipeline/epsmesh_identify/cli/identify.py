@@ -117,12 +117,13 @@ def _tell(line: str) -> None:
 
 def _print(study: "Study", dataset: "xr.Dataset", file: Path) -> None:
     """Print the answer, and the material to paste."""
-    from epsmesh_identify.report.identified import answer, material
+    from epsmesh_identify.report.identified import answer, is_passed_on, material
 
     print(study.title)
     print("\n".join(f"  {line}" for line in answer(dataset)))
     if block := material(dataset):
-        print(f'\n{block}\n\n# or, with the error bars:\n[material]\nfrom = "{file}"\n')
+        whole = f'\n\n# or, with the error bars:\n[material]\nfrom = "{file}"' if is_passed_on(dataset) else ""
+        print(f"\n{block}{whole}\n")
 
 
 def _verdicts(dataset: "xr.Dataset") -> dict[str, Any]:

@@ -10,6 +10,7 @@ from epsmesh.study.case import Case
 from epsmesh.study.check import warn_of_depth
 from epsmesh.study.plausible import size_of
 from epsmesh.study.problems import Problems
+from epsmesh_identify.estimation.model import MODULI
 from epsmesh_identify.estimation.parts import CurveFit, Measured, Unknown
 from epsmesh_identify.experiment.curve import Curve
 from epsmesh_identify.report.identified import engineering
@@ -60,7 +61,7 @@ def doubts_of_radius(cases: Sequence[Case], sought: Sequence[Unknown]) -> Iterat
     """
     of_tools = [case.probe for case in cases if case.probe.shape in _POWERS]
     has_error = any(one.name.partition(" of ")[0] == "radius" for one in sought)
-    if has_error or not of_tools or not any(one.name.endswith("young") for one in sought):
+    if has_error or not of_tools or not any(one.name.endswith(MODULI) for one in sought):
         return
     remedy = 'give its error, such as errors = {radius = "5 %"} in the [[measurement]]'
     if len(cases) > 1:
@@ -108,7 +109,7 @@ def _values(unknowns: Sequence[Unknown], high: int) -> dict[str, float]:
     """Return values of unknowns: moduli at the lower or upper end of their range, others in the middle."""
     values = {}
     for one in unknowns:
-        if one.unit == "Pa":
+        if one.name.endswith(MODULI):
             values[one.name] = one.high if high else one.low
         elif one.prior is not None:
             values[one.name] = one.prior[0]

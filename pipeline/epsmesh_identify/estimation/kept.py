@@ -18,7 +18,16 @@ class Kept:
     def __init__(self, output: Path, study: Study):
         self._folder = output / "identified"
         # With what is in the files that the study names.
-        read = {f"{case.body.model_dump_json()} {case.material.model_dump_json()}" for case in cases_of(study)}
+        read = {
+            " ".join(
+                (
+                    case.body.model_dump_json(),
+                    case.material.model_dump_json(),
+                    *(tissue.varying.identity for tissue in case.tissues if tissue.varying),
+                )
+            )
+            for case in cases_of(study)
+        }
         self._study = "\n".join((f"{__version__} {git_commit()}", study.text, *sorted(read)))
 
     def read(self, specimen: Specimen) -> xr.Dataset | None:

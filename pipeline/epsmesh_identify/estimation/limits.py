@@ -6,6 +6,7 @@ import numpy as np
 
 from epsmesh_identify.estimation.bars import interval
 from epsmesh_identify.estimation.fit import Fit
+from epsmesh_identify.estimation.model import MODULI
 from epsmesh_identify.report.identified import engineering, title
 
 # Coordinates this near to an end are at it.
@@ -68,7 +69,7 @@ def begins_later(found: Fit) -> bool:
 def _too_weak(found: Fit) -> list[str]:
     """Return which curves have a far larger force than the largest moduli would give with the earliest contact."""
     model, x = found.model, found.x.copy()
-    x[[name.endswith("young") for name in model.names]] = 1.0
+    x[[name.endswith(MODULI) for name in model.names]] = 1.0
     x[[name.startswith("contact_point") for name in model.names]] = 0.0
     values, weak = model.space.values(x), []
     for number, one in enumerate(model.measured):

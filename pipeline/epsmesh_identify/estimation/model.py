@@ -20,6 +20,9 @@ from epsmesh_identify.experiment.curve import Curve
 OF_CURVE = ("contact_point", "baseline", "tilt", "drift")
 """Unknowns of which every curve has its own."""
 
+MODULI = ("young", "scale")
+"""Ends of the names of unknowns that forces are proportional to together: moduli, and scales of their fields."""
+
 ALWAYS = ("contact_point", "baseline")
 """Unknowns of every fit, named or not."""
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from epsmesh.arrays import FloatArray
 from epsmesh.report.words import percent
 from epsmesh_identify.estimation.fit import Fit
-from epsmesh_identify.estimation.model import Space
+from epsmesh_identify.estimation.model import MODULI, Space
 from epsmesh_identify.estimation.parts import Unknown
 from epsmesh_identify.report.identified import title
 
@@ -57,7 +57,7 @@ def _notes(names: Sequence[str], spread: FloatArray, seen: Sequence[bool]) -> It
     done = set[str]()
     for first, second in permutations(range(len(names)), 2):
         a, b = names[first], names[second]
-        if not a.endswith("young") or {a, b} & done or spread[second, second] <= 0:
+        if not a.endswith(MODULI) or {a, b} & done or spread[second, second] <= 0:
             continue
         correlation = spread[first, second] / np.sqrt(spread[first, first] * spread[second, second])
         if seen[first] and seen[second] and abs(correlation) < _TOGETHER:

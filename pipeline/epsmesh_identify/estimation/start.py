@@ -5,7 +5,7 @@ from scipy.optimize import least_squares
 
 from epsmesh.arrays import FloatArray
 from epsmesh_identify.estimation.fit import prior
-from epsmesh_identify.estimation.model import Model
+from epsmesh_identify.estimation.model import MODULI, Model
 
 # Contact points that are tried, as shares of the recorded depths, and farther before the first row where the range
 # has them, then between those next to the best; coordinates of the other unknowns without prior.
@@ -50,7 +50,7 @@ def _place(model: Model, other: float) -> FloatArray:
         _, x, scale = min([tried[best], *finer], key=lambda one: one[0])
         scales.append(scale)
     for place, name in enumerate(model.names):
-        if name.endswith("young"):
+        if name.endswith(MODULI):
             value = float(model.space.value(place, x[place])) * float(np.exp(np.mean(np.log(scales))))
             unknown = model.space.unknowns[place]
             x[place] = model.space.coordinate(place, float(np.clip(value, unknown.low, unknown.high)))

@@ -47,7 +47,7 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
 def wanted(dataset: xr.Dataset) -> list[str]:
     """Return the unknowns that were asked for, the moduli first."""
     names: list[str] = dataset["unknown"].values[dataset["wanted"].values.astype(bool)].astype(str).tolist()
-    return sorted(names, key=lambda name: not name.endswith("young"))
+    return sorted(names, key=lambda name: not name.endswith(("young", "scale")))
 
 
 def answer(dataset: xr.Dataset) -> list[str]:
@@ -198,6 +198,8 @@ def title(name: str) -> str:
     owner, _, key = name.rpartition("_")
     if name in _NAMES or owner.startswith("relaxation"):
         return _NAMES.get(name, name.replace("_", " "))
+    if key == "scale":
+        return f"scale of the field of E{f' in {owner}' if owner else ''}"
     known = quantity_of(key)
     if owner and known:
         return f"{known.symbol or key} of {owner}"
@@ -229,6 +231,11 @@ def readable(largest: float, unit: str) -> tuple[float, str]:
     return float(number) / largest if largest else 1.0, word
 
 
+def is_passed_on(dataset: xr.Dataset) -> bool:
+    """Return whether another study can read the material with its bars: not the scale of a field."""
+    return not any(name.endswith("scale") for name in map(str, dataset["unknown"].values))
+
+
 def material(dataset: xr.Dataset) -> str:
     """Return what was found of the tissue as lines of a study file; "" if there is no one material.
 
@@ -252,6 +259,8 @@ def material(dataset: xr.Dataset) -> str:
         second = bar(dataset, name, hidden=True)
         comment = f"{bar(dataset, name)}{f'; {second} with what may be undeclared' if second else ''}"
         heading = f'# in the table of "{owner}":' if owner else "[material]"
+        if key == "scale":
+            heading = f'# in the table `young` of "{owner or "material"}":'
         lines.setdefault(heading, []).append(f"{key} = {text}  # {comment}")
     if terms:
         own = ", ".join(f"{{ {', '.join(terms[key])} }}" for key in sorted(terms))

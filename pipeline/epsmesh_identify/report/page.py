@@ -15,7 +15,17 @@ from epsmesh.report.page.inline import PAGE_CSS, in_page
 from epsmesh.study.identified import FITS
 from epsmesh_identify.report.figures.identification import identification
 from epsmesh_identify.report.figures.sensitivity import sensitivity
-from epsmesh_identify.report.identified import answer, bar, estimated, if_undeclared, material, parts, title, wanted
+from epsmesh_identify.report.identified import (
+    answer,
+    bar,
+    estimated,
+    if_undeclared,
+    is_passed_on,
+    material,
+    parts,
+    title,
+    wanted,
+)
 from epsmesh_identify.report.sensitivity import rows_of, sentences
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -45,6 +55,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
         is_beside=is_one,
         parts=[parts(dataset, one) for one in wanted(dataset)] if is_one and fits else [],
         material=material(dataset),
+        is_passed_on=is_passed_on(dataset),
     )
 
 

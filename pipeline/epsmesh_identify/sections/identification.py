@@ -20,7 +20,7 @@ _MOST = 1000
 # Bounds of a value with an error: this many times the error, which is two standard deviations.
 _ERRORS = 2.5
 # Ends of the names of what is a property of the tissue, not of one specimen or tool.
-_OF_TISSUE = ("young", "poisson")
+_OF_TISSUE = ("young", "scale", "poisson")
 # A range, and a value, as a study writes them, by SI unit.
 _EXAMPLES = {
     "Pa": ('["1 kPa", "1 MPa"]', '"10 kPa"'),
@@ -209,7 +209,7 @@ def _add_implied(
     """Add moduli if nothing is asked for, contact point, baseline, and a machine's stiffness that is a range."""
     if not any(one.is_wanted and one.parameter.place for one in given.values()):
         for name, parameter in known.items():
-            if name == "young" or name.endswith("_young"):
+            if parameter.is_modulus:
                 asked = given.get(name, Sought(parameter, parameter.low, parameter.high))
                 given[name] = replace(asked, is_wanted=True)
     for name in ("contact_point", "baseline"):

@@ -16,6 +16,8 @@ from epsmesh.study.swept import Place
 # A modulus that F is proportional to may have any value: the softest gel to the stiffest metal (Pa).
 _MODULI = (1e-2, 1e12)
 _WIDEST = (10.0, 1e11)
+# Scales of a field: the bounds of their key.
+_SCALES = (1e-12, 1e6)
 # Default ranges: factors of the value that the study declares.
 _OF_MODULUS, _OF_LENGTH, _OF_TOOL = 30.0, 2.0, 1.1
 # Springs of force microscopes to frames of testing machines (N/m).
@@ -52,6 +54,11 @@ class Parameter:
     place: Place = ()
     is_logarithmic: bool = False
 
+    @property
+    def is_modulus(self) -> bool:
+        """Whether forces are proportional to it and all others together: Young's modulus, or the scale of its field."""
+        return self.place[-1:] == ("young",) or self.place[-2:] == ("young", "scale")
+
 
 # The depth of the tool: no unknown of a force curve, which has all depths.
 DEPTH = Parameter("depth", "m", 0.0, inf, 0.0, inf, place=("probe", "depth"), is_logarithmic=True)
@@ -76,7 +83,12 @@ def _of_tissues(body: Body, material: Material) -> Iterator[Parameter]:
     for prefix, place, tissue in tissues:
         value, is_alone = tissue.young, len(tissues) == 1
         low, high = _WIDEST if is_alone else (value / _OF_MODULUS, value * _OF_MODULUS)
-        yield Parameter(f"{prefix}young", "Pa", *_MODULI, low, high, value, (*place, "young"), is_logarithmic=True)
+        if tissue.varying is None:
+            yield Parameter(f"{prefix}young", "Pa", *_MODULI, low, high, value, (*place, "young"), is_logarithmic=True)
+        else:
+            scale, at = tissue.varying.scale, (*place, "young", "scale")
+            usual = scale / _OF_MODULUS, scale * _OF_MODULUS
+            yield Parameter(f"{prefix}scale", "1", *_SCALES, *usual, scale, at, is_logarithmic=True)
         least = Material.LEAST_OF_LARGE if tissue.completed(material).is_large else 0.0
         yield Parameter(f"{prefix}poisson", "1", least, 0.5, least, 0.5, tissue.poisson, (*place, "poisson"))
         yield from _of_law(prefix, place, tissue)

@@ -40,7 +40,6 @@ def _read_experiment(study: Reading) -> tuple[tuple[Measurement, ...], Identific
     measurements = read_measurements(raw["measurement"], problems) if "measurement" in raw else ()
     if problems.errors or not (measurements or "identify" in raw):
         return measurements, Identification()
-    _check_constant(study.sections, "identification", problems)
     found = read_identify(raw.get("identify", {}), measurements, _parameters(study.sections), problems)
     for number, measurement in enumerate(measurements, start=1):
         where, known = f"measurement[{number}]", _parameters(study.sections)
@@ -48,7 +47,6 @@ def _read_experiment(study: Reading) -> tuple[tuple[Measurement, ...], Identific
             scene = scene_at(raw, measurement, where, study.file, problems)
             if scene is None:
                 continue
-            _check_constant(scene.sections, "identification", problems)
             known = _parameters(scene.sections)
             check_shared(found, measurement, known, problems)
         found = own_errors(found, measurement, where, known, problems)
@@ -59,18 +57,18 @@ def _read_spread(study: Reading, outputs: Sequence[Output]) -> Spread:
     """Return the parameters that are varied, and the outputs to explain."""
     if study.problems.errors or "sensitivity" not in study.given:
         return Spread()
-    _check_constant(study.sections, "sensitivity", study.problems)
+    _check_constant(study.sections, study.problems)
     known = {name: one for name, one in _parameters(study.sections).items() if one.place}
     asked = study.given["sensitivity"]
     return read_sensitivity(asked, known | {DEPTH.name: DEPTH}, outputs, study.problems)
 
 
-def _check_constant(sections: Mapping[str, tuple[Section, ...]], what: str, problems: Problems) -> None:
-    """Report moduli that vary from place to place: a modulus is then no number to be found or varied."""
+def _check_constant(sections: Mapping[str, tuple[Section, ...]], problems: Problems) -> None:
+    """Report moduli that vary from place to place: a modulus is then no number to be varied."""
     for body, material in product(sections["body"], sections["material"]):
         assert isinstance(body, Body) and isinstance(material, Material)
         if any(tissue.varying is not None for tissue in (material, *body.regions)):
-            allowed = f"is a field, and {what} is computed for one modulus in each region: give a value"
+            allowed = "is a field, and sensitivity is computed for one modulus in each region: give a value"
             problems.error("material.young", None, allowed)
             return
 

@@ -15,7 +15,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class Reference:
-    """The modulus that all others are divided by, with its value (Pa) in the solved cases."""
+    """The modulus, or scale of a field, that all others are divided by, with its value in the solved cases."""
 
     parameter: Parameter
     is_known: bool
@@ -27,13 +27,13 @@ class Reference:
 
     @property
     def young(self) -> float:
-        """Value (Pa) in the solved cases: that of the study."""
+        """Value (Pa; of a field its scale) in the solved cases: that of the study."""
         return self.parameter.value
 
 
 def reference_of(scene: Study, bounds: Bounds) -> Reference:
     """Return the modulus to refer to: a known one if there is any, so that those to find are all parameters."""
-    moduli = [one for one in parameters(scene).values() if one.place[-1] == "young"]
+    moduli = [one for one in parameters(scene).values() if one.is_modulus]
     known = [one for one in moduli if one.name not in bounds]
     return Reference((known or moduli)[0], bool(known))
 

@@ -14,7 +14,10 @@ _POISSON: Place = ("material", "poisson")
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter of a study between two values, in SI units; of a modulus, its ratio to that of reference."""
+    """A parameter of a study between two values, in SI units; of a modulus, its ratio to that of reference.
+
+    The scale of a field is as a modulus.
+    """
 
     parameter: Parameter
     low: float
@@ -33,7 +36,7 @@ class Range:
     @property
     def is_ratio(self) -> bool:
         """Whether it is a modulus."""
-        return self.place[-1] == "young"
+        return self.parameter.is_modulus
 
     @property
     def _is_logarithmic(self) -> bool:
