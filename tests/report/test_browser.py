@@ -146,6 +146,20 @@ def test_hands_sort_filter_and_clear(browser, path):
     assert browser.ask(SORTED)["poisson"] != "descending"
 
 
+def test_a_tool_clear_of_the_body_is_a_row_of_the_table(browser, tmp_path):
+    """A state of two words; and only what differs among the cases chooses among them."""
+    line = {"line": {"from": ["0 mm", "0 mm"], "to": ["60 mm", "0 mm"], "steps": 4}, "off": "no contact"}
+    data = dataset(probe={"path": line}, mesh={"epsilon": ["full"]})
+    browser.open(write_page(data, tmp_path / "off.html"))
+    assert browser.messages == []
+    states = column(browser, "status")
+    assert len(states) == 4
+    assert "no contact" in states
+    chosen = browser.ask("[...document.querySelectorAll('.filters select')].map(e => e.name)")
+    assert {"status", "path"} <= {*chosen}
+    assert "epsilon" not in chosen
+
+
 def test_links_of_failures_show_them(browser, path):
     browser.open(path)
     browser.ask("document.querySelector('#failures a').click()")

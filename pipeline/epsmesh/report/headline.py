@@ -36,7 +36,7 @@ def _of_forces(dataset: xr.Dataset) -> str:
     if size == 1:
         return f"{what} = {_one(dataset, name)}{_depth(dataset)}."
     if known == 1:
-        return f"One of {size} cases has a force, {_one(dataset, name)}."
+        return f"One of {size} cases has a force. {what} = {_one(dataset, name)}."
     which = "" if known == size else f"{known} of {size} cases have a force. "
     return f"{which}{what} is {values}{_place(dataset)}{bar and f'; the largest error bar is {bar}'}."
 

@@ -21,6 +21,7 @@ from epsmesh.states import FAILURES, NO_CONTACT, OK, PENDING, SKIPPED
 PLACES = ("x", "y")
 _MOST_PANELS = 3
 _COLOURS = "cividis"
+_WHOLE = {"edgecolors": "face", "linewidth": 0.4}  # else gaps between cells are seen in a page
 _PANEL = 3.0  # inches: the width of a panel
 # Beside the outline, as a share of the map.
 _ROOM = 0.03
@@ -50,6 +51,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             ax.set_title(titles[column] if row == 0 else "")
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"], short=column > 0))
+            ax.tick_params(labelleft=True)  # on a phone a column is alone
         figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
     tells = "The force at each place, seen from above, and below it its 95\N{NO-BREAK SPACE}% error bar."
     finish(figure, title, " ".join(filter(None, (tells, facets.note))), warning)
@@ -61,7 +63,7 @@ def draw_map(ax: Axes, part: xr.Dataset, values: np.ndarray, **look: Any) -> Any
     ax.grid(visible=False)
     factor = scale(part["x"])[0]
     x, y = (factor * part[name].values for name in PLACES)
-    drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | look)
+    drawn = ax.pcolormesh(x, y, np.ma.masked_invalid(values), shading="nearest", **{"cmap": _COLOURS} | _WHOLE | look)
     for state, marker, colour, label in (
         ([NO_CONTACT], "o", LINE, "no contact"),
         ([*FAILURES, SKIPPED, PENDING], "x", FAILED, "no force"),

@@ -31,8 +31,8 @@ from epsmesh.report.uncertainty import bars, next_step
 from epsmesh.report.values import at_peak
 from epsmesh.states import FAILURES, SKIPPED
 
-# What the answer says of times, and the headlines need not say again.
-_TOLD = "speed-ups"
+# Facts that the answer has already: of a guide, and of other studies.
+_TOLD = {True: {"speed-ups"}, False: {"force", "depth", "largest error bar"}}
 _TEMPLATES, _VENDOR = Path(__file__).parent / "templates", Path(__file__).parent / "vendor"
 # jQuery, which DataTables needs, comes before it.
 _SCRIPTS = (_VENDOR / "jquery.slim.min.js", _VENDOR / "dataTables.min.js", _TEMPLATES / "page.js")
@@ -56,6 +56,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
     study = str(dataset.attrs.get("study", ""))
     guide = guide_if_any(over_time)
     table, known = case_table(dataset), bars(dataset)
+    failures = [line for state in FAILURES for line in by_status(dataset, state)]
     return render_page(
         _TEMPLATES / "page.html.j2",
         joined(*_SCRIPTS),
@@ -65,8 +66,8 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         scene=scene,
         is_one=over_time["force"].size == 1,  # seen rather than drawn over nothing
         scene_scripts=_SCRIPT.findall(scene)[:2],
-        facts=[fact for fact in facts(dataset) if not (guide and fact[0] == _TOLD)],
-        failures=[line for state in FAILURES for line in by_status(dataset, state)],
+        facts=[fact for fact in facts(dataset) if fact[0] not in _TOLD[bool(guide)]],
+        failures=failures,
         without_exact=without_exact(dataset),
         warnings=warnings_of(dataset),
         figures=_figures(over_time),
@@ -76,7 +77,7 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         bars=[[one.cause, one.size, one.source] for one in known] if len(known) > 1 else [],
         next_step=next_step(known),
         table=table,
-        many_cases=counted(len(table.order), "case"),
+        many_cases=counted(len(table.order), "case") + (", failed ones first" if failures else ""),
         first_rows=FIRST_ROWS,
         reductions=reductions(dataset),
         origins=origins(dataset),

@@ -104,7 +104,7 @@ class Table:
     @property
     def filters(self) -> list[Column]:
         """The columns by whose words cases can be chosen."""
-        return [column for column in self.columns if column.is_filter]
+        return [column for column in self.columns if column.is_filter and len(column.words or ()) > 1]
 
 
 def case_table(dataset: xr.Dataset) -> Table:

@@ -41,7 +41,7 @@ const table = new DataTable("#table", {
       return kind === "display" ? marked(textOf(column, row)) : textOf(column, row);
     },
   })),
-  createdRow: (line, { row }) => line.classList.add(textOf(byName.get("status"), row)),
+  createdRow: (line, { row }) => line.classList.add(...textOf(byName.get("status"), row).split(" ")),
   order: [],
   autoWidth: false,
   deferRender: true,
