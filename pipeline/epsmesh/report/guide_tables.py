@@ -47,9 +47,9 @@ def outsides(
                 "outside": name,
                 "smallest ε": _short(coordinates, plain),
                 "worst error": percent(plain.error) if plain else "",
-                "smallest ε with F / r": _short(coordinates, corrected),
+                "ε with F / r": _short(coordinates, corrected),
                 "r": f"{law.r:.4g}" if law else "",
-                "worst error with F / r": percent(law.error) if law else "",
+                "error with F / r": percent(law.error) if law else "",
             }
         )
     return pd.DataFrame(rows)

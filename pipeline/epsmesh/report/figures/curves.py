@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from epsmesh.quantities import write
 from epsmesh.report.figures.facets import Facets
@@ -23,8 +24,9 @@ _LONG = 30.0  # values that span more than this have a logarithmic axis
 _LINEAR = {"depth"}  # F over it is read as a stiffness
 # Letters: of a word's line at an axis, of all words there, of a panel's title, and of a line beside an axis.
 _WORD, _LINE, _TITLE, _LABEL = 14, 32, 34, 26
-_MARKED = 40  # points of a curve up to which each has a marker
+_MARKED = 40  # points of a curve up to which each has a marker and a bar
 BARS = {"capsize": 2, "elinewidth": 0.8}
+_STEPS = [1, 2, 5, 10]  # of ticks: 2.5 takes one more digit
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ def grid(
     for j, (one, column) in enumerate(columns):
         for ax, (row, quantity) in zip(axes[:, j], rows, strict=True):
             panels.append(Panel(ax, dataset.sel(one.at | row | column), quantity, j, one))
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.set_major_locator(MaxNLocator("auto", steps=_STEPS))
             if quantity == quantities[0]:
                 ax.set_title(textwrap.fill(choices(dataset, row | column), _TITLE))
             ax.set_ylabel(textwrap.fill(heading(dataset[quantity], short=j > 0), _LABEL))
@@ -94,11 +98,14 @@ def draw(panel: Panel) -> None:
         if not np.isfinite(y).any():
             continue
         style = own | ({} if joins else {"linestyle": "none"})
-        style |= {"marker": "none"} if joins and len(x) > _MARKED and not _has_lone(y) else {}
+        is_long = joins and len(x) > _MARKED and not _has_lone(y)
+        style |= {"marker": "none"} if is_long else {}
         beside = x if joins else x + 0.12 * (position - (count - 1) / 2)
         if (error := f"{panel.quantity}_error") in line:
             bars = np.broadcast_to(np.nan_to_num(np.abs(factor * line[error].values)), y.shape)
-            panel.ax.errorbar(beside, y, bars, label=label or None, **BARS, **style)
+            if is_long:  # a band: the ends of so many bars would cover the curve
+                panel.ax.fill_between(x, y - bars, y + bars, color=own["color"], alpha=0.15, linewidth=0)
+            panel.ax.errorbar(beside, y, None if is_long else bars, label=label or None, **BARS, **style)
         else:
             panel.ax.plot(beside, y, label=label or None, **style)
         failed = np.isin(line["status"].values.astype(str), FAILURES)
@@ -145,6 +152,8 @@ def write_ticks(ax: Axes, coordinate: xr.DataArray) -> None:
     if finite.size == len(x):
         return
     ax.margins(x=0.05)
+    ax.update_datalim([(place, 0.0) for place in x], updatey=False)  # of cases without a value, too
+    ax.autoscale_view(scaley=False)
     low, high = (finite.min(), finite.max()) if finite.size else (0.0, 0.0)
     ticks = [tick for tick in ax.get_xticks() if low - 1e-9 <= tick <= high] if finite.size else []
     full = x[~np.isfinite(values)][0]

@@ -12,6 +12,7 @@ from epsmesh.report.figures.curves import BARS, grid, share
 from epsmesh.report.figures.facets import arrange, swept
 from epsmesh.report.figures.style import COLOURS, LINE, WIDTH, finish, new_figure
 from epsmesh.report.values import punctures
+from epsmesh.report.words import heading
 
 _HEIGHT = 5.2  # inches
 _PARTS = ("force_cutting", "force_friction", "force_elastic")
@@ -53,11 +54,11 @@ def insertion(dataset: xr.Dataset, title: str, warning: str) -> Figure:
         above.fill_between(away, pulled - own, pulled + own, **_BAND)
         above.plot(away, pulled, color=COLOURS[4], label="F of the withdrawal")
         above.axhline(0, color=LINE, linewidth=0.6)
-    above.set_ylabel("force (mN)")
+    above.set_ylabel(heading(dataset["force"]))
     _stack(below, dataset, _ENERGIES)
     below.plot(depth, 1e3 * with_puncture(dataset, "work"), color=LINE, linestyle="--", label="work of the tool")
-    below.set_ylabel("energy (mJ)")
-    below.set_xlabel("depth of the tip (mm)")
+    below.set_ylabel("energy, mJ")
+    below.set_xlabel("depth of the tip, mm")
     _name_phases(above, dataset)
     finish(figure, title, _CAPTION, warning)
     return figure

@@ -127,7 +127,7 @@ def history(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     """The force, the depth of the tool and the dissipated energy over time."""
     quantities = ["force", *(name for name in _OVER_TIME if _varies(dataset, name))]
     dataset = dataset.assign({name: by_case(dataset, name) for name in ("status", *quantities)})
-    return _against(dataset, ["time"], quantities, (title, f"The force over time; {_BARS}", "", warning))
+    return _against(dataset, ["time"], quantities, (title, f"The force over time; bands and {_BARS}", "", warning))
 
 
 def _against(dataset: xr.Dataset, shown: list[str], quantities: list[str], words: tuple[str, str, str, str]) -> Figure:

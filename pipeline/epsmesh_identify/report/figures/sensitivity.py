@@ -36,7 +36,7 @@ def sensitivity(dataset: xr.Dataset) -> Figure:
     figure = new_figure(WIDTH, count * (_PANEL + _ROW * dataset.sizes["parameter"]))
     for number, ax in enumerate(np.ravel(figure.subplots(count, 1, sharex=True))):
         _panel(ax, dataset.isel(output=number))
-    figure.axes[-1].set_xlabel("share of the variance (%)")
+    figure.axes[-1].set_xlabel("share of the variance, %")
     finish(figure, str(dataset.attrs.get("title", "")).replace("$", r"\$"), _CAPTION)
     return figure
 
