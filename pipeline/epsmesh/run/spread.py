@@ -37,8 +37,8 @@ _FINEST, _TOLERANCE, _HALVINGS = 0.2, 5e-4, 20
 # Least change of the double integral by one degree more, in units of what it were if all shares changed to one side.
 _POINTWISE = 0.1
 # Mean of ln F above that to first order, as a share of the variance that is averaged out, and what is left of it. What
-# the first order leaves of the deviation of ln F, relative, as a share of the variance of ln E. They are calibrated on
-# the scenes of one seed of benchmarks/spread.py, and judged on those of another.
+# the first order leaves of the deviation of ln F, relative, as a share of the variance of ln E. They are of twelve
+# scenes with sampled fields; benchmarks/spread.py judges them on others.
 _HELD, _OF_HELD, _OF_DEVIATION = 0.09, 0.15, 0.25
 # Clusters whose distances to all others are computed at once; cells whose extents are.
 _ROWS, _CHUNK = 256, 20_000
