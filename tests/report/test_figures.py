@@ -176,6 +176,19 @@ def test_no_line_goes_over_a_case_without_a_force(kind):
     assert all(np.isnan(line.get_ydata()[2]) for line in curves)
 
 
+@pytest.mark.parametrize("alike", [["coarse"], ["coarse", "free"]])
+def test_where_the_mesh_changes_no_force_there_is_no_error_to_draw(alike, tmp_path):
+    """Errors of nought have no place on a logarithmic axis: the others are drawn, and without any there is no figure."""
+    data = dataset(mesh={"epsilon": EPSILONS, "outside": ["coarse", "free"]})
+    same = data["outside"].isin(alike)
+    data["force_ratio"] = data["force_ratio"].where(~same, 1.0)
+    assert ("error" in choose(data)) == (len(alike) < 2)
+    figure(data, "error").savefig(tmp_path / "asked.png")
+    if len(alike) < 2:
+        drawn = figure(data, "error").axes[0].lines[0].get_ydata()[:-1]
+        np.testing.assert_allclose(drawn, 100 * abs(1 - data["force_ratio"].sel(outside="free").values[:-1]))
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_figure_that_does_not_suit_says_what_it_lacks(kind):
     assert lacks(dataset(), kind).startswith("needs ")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from epsmesh.files import FIGURE_FORMATS
 from epsmesh.printable import counted
 from epsmesh.report.figures.compliance import compliance, shows_tools
-from epsmesh.report.figures.facets import Facets, is_meshed, rest, swept
+from epsmesh.report.figures.facets import Facets, is_meshed, rest, swept, with_error
 from epsmesh.report.figures.influence import influence
 from epsmesh.report.figures.insertion import insertion
 from epsmesh.report.figures.map import force_map
@@ -72,7 +72,7 @@ def choose(dataset: xr.Dataset) -> list[str]:
         "insertion": is_path,
         "history": is_over_time,
         "ratio": dataset.sizes.get("epsilon", 0) > 1 and _known(dataset, "force_ratio"),
-        "error": is_meshed(dataset) and (_known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")),
+        "error": is_meshed(dataset) and _has_errors(dataset),
         "map": all(dataset.sizes.get(name, 0) > 1 for name in ("x", "y")),
         "force": not is_path and bool(swept(dataset)),
     }
@@ -172,6 +172,12 @@ def _plain(text: str) -> str:
 
 def _known(dataset: xr.Dataset, name: str) -> bool:
     return name in dataset and bool(np.isfinite(dataset[name]).any())
+
+
+def _has_errors(dataset: xr.Dataset) -> bool:
+    """Tell whether some F is off its reference: on a logarithmic axis, none is not drawn."""
+    is_compared = _known(dataset, "force_exact_ratio") or _known(dataset, "force_ratio")
+    return is_compared and _known(with_error(dataset)[1], "error")
 
 
 def _missing(dataset: xr.Dataset) -> str:

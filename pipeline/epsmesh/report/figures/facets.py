@@ -56,7 +56,7 @@ def arrange(
     """
     free = [str(dim) for dim in dataset["force"].dims if dim != x and dim not in flat]
     live = [d for d in free if dataset.sizes[d] > 1 and any(_depends(dataset[name], d) for name in quantities)]
-    at = {dim: _representative(dataset, dim, x) for dim in free if dim not in live}
+    at = {dim: _representative(dataset, dim, x, quantities) for dim in free if dim not in live}
     ranks: tuple[Callable[[str], Any], ...] = (
         lambda dim: (dim not in first, not is_numeric(dataset[dim]), dim == "outside"),
         lambda dim: (dim != "outside", is_numeric(dataset[dim])),
@@ -68,7 +68,7 @@ def arrange(
         if dim is not None:
             live.remove(dim)
         chosen.append(_spread(dataset, dim, count))
-    fixed = {dim: _representative(dataset, dim, x) for dim in live}
+    fixed = {dim: _representative(dataset, dim, x, quantities) for dim in live}
     words = [f"{choice(dataset[d], value)} (one of {dataset.sizes[d]})" for d, value in fixed.items()]
     part = [
         f"{len(some)} of {dataset.sizes[d]} values of {symbol(dataset[d])}"
@@ -120,11 +120,12 @@ def with_error(dataset: xr.Dataset) -> tuple[str, xr.Dataset]:
 
     ``exact_bar`` is the relative error bar of F_exact.
 
-    Return the name of the reference as well, "exact" or "max". A case that is its own reference has no error.
+    Return the name of the reference as well, "exact" or "max". A case that is its own reference has no error, nor
+    has one that agrees with it to the last digit: a logarithmic axis has no place for it.
     """
     is_exact = bool(np.isfinite(dataset["force_exact_ratio"]).any())
     signed = dataset["force_exact_ratio" if is_exact else "force_ratio"] - 1
-    error = abs(signed) if is_exact else abs(signed).where(signed != 0)
+    error = abs(signed).where(signed != 0)
     exact_bar = relative(dataset, "force_exact_error")
     added = {"error": error, "is_by_chance": is_by_chance(error), "exact_bar": exact_bar}
     return "exact" if is_exact else "max", dataset.assign(added)
@@ -147,12 +148,13 @@ def _spread(dataset: xr.Dataset, dim: str | None, most: int) -> list[Selection]:
     return [{dim: values[i]} for i in chosen]
 
 
-def _representative(dataset: xr.Dataset, dim: str, x: str | None) -> Any:
-    """Return the value at which a dimension without a place is shown: of those with most forces, the finest or first.
+def _representative(dataset: xr.Dataset, dim: str, x: str | None, quantities: Sequence[str]) -> Any:
+    """Return the value at which a dimension without a place is shown: of those with most known, the finest or first.
 
     The full order has no outside: against that, the middle ε is shown.
     """
-    known = np.isfinite(dataset["force"]).sum([d for d in dataset["force"].dims if d != dim]).values
+    counts = [np.isfinite(dataset[name]).broadcast_like(dataset["force"]) for name in quantities]
+    known = sum(count.sum([d for d in count.dims if d != dim]).values for count in counts)
     values = dataset[dim].values[known == known.max()]
     if dim == "epsilon" and x == "outside" and np.isfinite(values).any():
         finite = np.sort(values[np.isfinite(values)])

@@ -4,6 +4,7 @@ import textwrap
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -123,7 +124,10 @@ def write_above(ax: Axes, title: str, letters: int, columns: int) -> Legend:
 
 
 def log_scale(ax: Axes, which: str = "y") -> None:
-    """Make an axis logarithmic, with round numbers written as people write them."""
+    """Make an axis logarithmic, with round numbers written as people write them; not one without a positive number."""
+    together = getattr(ax, f"get_shared_{which}_axes")().get_siblings(ax)
+    if not any(np.isfinite(getattr(one, f"{which}axis").get_minpos()) for one in together):
+        return
     getattr(ax, f"set_{which}scale")("log")
     axis: Axis = getattr(ax, f"{which}axis")
     low, high = sorted(axis.get_view_interval())
