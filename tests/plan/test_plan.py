@@ -63,12 +63,6 @@ def test_what_a_blade_is_said_to_do_changes_no_force(probe):
     assert keys[0] == keys[1] == keys[2]
 
 
-def test_a_radius_that_an_accuracy_makes_meaningless_is_solved_once():
-    plan = make_plan(study(mesh=ACCURATE | {"epsilon": ["8 mm", "10 mm"], "outside": ["coarse", "free"]}))
-    assert len(plan.keys) == 4
-    assert len(plan.solves) == 3
-
-
 def test_f_exact_beside_an_accuracy_is_computed_only_where_it_is_asked_for():
     """Its error bars tell enough; the plan says what F_exact would add."""
     left_out, asked = (raw(mesh=ACCURATE, solve=solve) for solve in ({"exact": None}, {"exact": True}))

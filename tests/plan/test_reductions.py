@@ -70,6 +70,15 @@ def test_force_with_and_without(name):
         np.testing.assert_allclose(reduced[1][variable], whole[1][variable], rtol=tolerance)
 
 
+@pytest.mark.parametrize("of_time", [False, True])
+def test_histories_are_spoken_of_where_there_are_some(of_time):
+    change = {"history": {"ramp": "1 s", "hold": "10 s"}} if of_time else {}
+    probes = [probe | change for probe in STUDIES["duplicates"]["probe"]]
+    (duplicates,) = make_plan(study(probe=probes)).skipped[:1]
+    assert duplicates.name == "duplicates"
+    assert ("Histories" in duplicates.reason) == of_time
+
+
 def test_all_at_once():
     changes = STUDIES["full"] | {"material": {"young": ["1 kPa", "5 kPa"], "poisson": [0.3, 0.4]}}
     reduced, whole = run(("axisymmetric",), **changes), run(("all",), **changes)

@@ -176,6 +176,14 @@ def test_no_line_goes_over_a_case_without_a_force(kind):
     assert all(np.isnan(line.get_ydata()[2]) for line in curves)
 
 
+def test_a_logarithmic_axis_begins_above_nought():
+    data = dataset(mesh={"epsilon": ["5 mm", "7 mm", "full"], "outside": ["free", "fixed"]})
+    data["force_ratio"].values[0] = [0.2, 12.0]
+    first = figure(data, "ratio").axes[0]
+    assert first.get_yscale() == "log"
+    assert 0.1 < first.get_ylim()[0] < 0.2
+
+
 @pytest.mark.parametrize("alike", [["coarse"], ["coarse", "free"]])
 def test_where_the_mesh_changes_no_force_there_is_no_error_to_draw(alike, tmp_path):
     """Errors of nought have no place on a logarithmic axis: the others are drawn, and without any there is no figure."""

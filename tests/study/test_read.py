@@ -134,7 +134,11 @@ MISTAKES = {
     "a speed": ({"probe": {"speed": "1 mm/s"}}, ["probe.speed", "`ramp` in [probe.history]"]),
     "a radius beside an accuracy": (
         {"mesh": NO_SIZES | {"accuracy": "1 %", "epsilon": ["9 mm", "full"]}},
-        ["mesh.epsilon", "has no effect with `accuracy`", 'outside = "free"'],
+        ['mesh.epsilon = ["9 mm", "full"]', "has no effect with `accuracy`", 'outside = "free"'],
+    ),
+    "a radius beside an accuracy, in some of the cases": (
+        {"mesh": NO_SIZES | {"accuracy": "1 %", "epsilon": ["9 mm", "6 mm", "full"], "outside": ["coarse", "free"]}},
+        ['mesh.outside = "coarse"', "one case for every epsilon", '"full" in epsilon'],
     ),
     "a body that is cut nowhere": (
         {"mesh": NO_SIZES | {"accuracy": "1 %", "outside": "free"}},
@@ -461,3 +465,27 @@ def _cut(epsilon):
 def test_an_accuracy_of_columns_alone_is_warned_of():
     assert any('"free": cuts the body at epsilon in every case' in one for one in _cut("9 mm"))
     assert not any("cuts the body" in one for one in _cut(["9 mm", "full"]))
+
+
+def test_a_radius_beyond_the_body_is_said_to_be_the_full_order():
+    """A warning that there is none, beside a plan that merges this case with it, would contradict the plan."""
+    said = [[one for one in study(mesh={"epsilon": ["8 mm", far]}).warnings if "F_max" in one]
+            for far in ("30 mm", "60 mm", "full")]  # fmt: skip
+    assert [len(warnings) for warnings in said] == [1, 1, 0]
+    assert 'the list has no "full" case' in said[0][0]
+    assert 'mesh.epsilon = "60 mm": extends beyond the body: write "full" in its place' in said[1][0]
+
+
+ROUNDED = {"edge": "0.5 mm", "contact": "unilateral"}
+SLAT = {"shape": "blade", "radius": None, "length": "8 mm", "width": "6 mm"}
+
+
+@pytest.mark.parametrize("tool", [{}, ROUNDED, SLAT, SLAT | ROUNDED], ids=["disc", "rounded", "blade", "rounded blade"])
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+def test_a_flat_tool_pressed_deep_into_linear_tissue_is_warned_of(tool, law):
+    def warnings(depth):
+        found = study(probe=tool | {"radius": "3 mm", "depth": depth} | tool, material={"law": law}).warnings
+        return [one for one in found if "an extrapolation" in one]
+
+    assert not warnings("0.29 mm")
+    assert [("300% of the tool's half width 3 mm" in one) for one in warnings("9 mm")] == [True] * (law == "linear")

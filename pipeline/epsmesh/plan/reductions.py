@@ -19,6 +19,7 @@ from epsmesh.study.closure import FarRegion
 
 # With fewer Poisson's ratios, each is solved: a reduced basis needs about five solutions itself.
 _FEWEST_RATIOS = 12
+_OF_TIME = "Histories of the depth and relaxation need no solve of their own."
 _LONE_DEPTHS = (
     "No initial guess from other depths: each depth of this tool has its own mesh. With probe.mesh_depths all depths "
     "share one mesh."
@@ -32,8 +33,11 @@ def skip_beyond_body(plan: Plan) -> Plan:
 
 
 def skip_duplicates(plan: Plan) -> Plan:
-    """Equal cases are solved once. Histories of the depth and relaxation need no solve of their own."""
-    return _merged(plan, [solve.key for solve in plan.solves], "duplicates", reason_of(skip_duplicates))
+    """Equal cases are solved once."""
+    reason = reason_of(skip_duplicates)
+    if any(solve.case.probe.history for solve in plan.solves):
+        reason = f"{reason} {_OF_TIME}"
+    return _merged(plan, [solve.key for solve in plan.solves], "duplicates", reason)
 
 
 def skip_scaled(plan: Plan) -> Plan:

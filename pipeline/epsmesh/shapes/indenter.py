@@ -215,10 +215,13 @@ class Indenter(Probe):
 
     def warn_of_strains(self, problems: Problems) -> None:
         """Warn of a depth at which the slope of the tool at the edge of contact is steep: strains are of that order."""
+        if self.section.flat:
+            super().warn_of_strains(problems)
+            return
         if self.contact_width >= self.footprint.half_width:  # an error of its own
             return
         slope = float(self.section.slope(np.array([self.contact_width]))[0])
-        if slope > _STEEPEST and not self.section.flat:
+        if slope > _STEEPEST:
             problems.warn(
                 "probe.depth",
                 f"{self.depth * 1e3:.4g} mm",

@@ -15,7 +15,7 @@ from epsmesh.shapes.footprint import Footprint
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.history import History
 from epsmesh.shapes.revolved import Revolved
-from epsmesh.shapes.section import Problems, Words
+from epsmesh.shapes.section import Problems, Words, in_mm
 from epsmesh.shapes.slit import Slit
 from epsmesh.units import Coordinate, Force, Length
 
@@ -26,6 +26,8 @@ _MANY = 200_000  # cached pairs of body and probe, enough for a large study
 Contact = Literal["bonded", "frictionless", "unilateral"]
 # The word for friction without limit, and the largest coefficient besides.
 STICK, MOST_FRICTION = "stick", 2.0
+# Linear elasticity, up to this depth in half widths: strain under a flat tool is of order depth / radius.
+LINEAR = 0.10
 ON_EDGE = 1e-6  # a point is on the edge of a footprint within this share
 
 
@@ -328,9 +330,19 @@ class Probe(Footprint):
 
     # ---- checks ---------------------------------------------------------------------------------------
 
-    @abstractmethod
     def warn_of_strains(self, problems: Problems) -> None:
-        """Warn of a depth at which strains are large for linear elasticity."""
+        """Warn of a depth at which strains are large for linear elasticity: of a flat face, not small beside it."""
+        if self.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
+            return
+        proportional = "F stays proportional to depth" if self.proportional_to else "strains are assumed small"
+        if self.deepest > LINEAR * self.half_width:
+            problems.warn(
+                "probe.depth",
+                in_mm(self.deepest),
+                f"is {self.deepest / self.half_width:.0%} of the tool's half width {in_mm(self.half_width)}. Above "
+                f"{LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {LINEAR:.0%}, F of a "
+                "neo-Hookean body is about 1 % smaller",
+            )
 
     def check(self, problems: Problems) -> None:
         """Report keys that contradict each other; annotations check each key alone."""

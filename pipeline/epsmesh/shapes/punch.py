@@ -10,10 +10,7 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.probe import Probe
-from epsmesh.shapes.section import Problems, in_mm
 
-# Linear elasticity, up to this depth in half widths: strain under the probe is of order depth / radius.
-LINEAR = 0.10
 # A line is an axis of the footprint within this tolerance on unit vectors.
 _ALIGNED = 1e-12
 
@@ -62,20 +59,6 @@ class Punch(Probe):
     def rim_distance(self, along: str, across: str, height: str, unit: float) -> str:
         """Return the distance to the edge of the face as text."""
         return self.edge_distance(along, across, height, unit)
-
-    def warn_of_strains(self, problems: Problems) -> None:
-        """Warn of a depth that is not small compared with the face."""
-        if self.half_width <= 0:  # a slit that leaves nothing of a blade says so itself
-            return
-        proportional = "F stays proportional to depth" if self.proportional_to else "strains are assumed small"
-        if self.deepest > LINEAR * self.half_width:
-            problems.warn(
-                "probe.depth",
-                in_mm(self.deepest),
-                f"is {self.deepest / self.half_width:.0%} of the tool's half width {in_mm(self.half_width)}. Above "
-                f"{LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {LINEAR:.0%}, F of a "
-                "neo-Hookean body is about 1 % smaller",
-            )
 
 
 class Straight(Punch):

@@ -13,8 +13,7 @@ import numpy as np
 from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.from_file import FromFile
-from epsmesh.shapes.probe import Probe, is_direction
-from epsmesh.shapes.punch import LINEAR
+from epsmesh.shapes.probe import LINEAR, Probe, is_direction
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.segmented import is_uncertain
 from epsmesh.shapes.triangles import SurfaceError
@@ -79,7 +78,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     problems.each(check_moduli, body=bodies, material=materials)
     problems.each(check_extent, body=bodies)
     problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
-    check_reference(meshes, axes, problems)
+    check_reference(meshes, axes, placed, problems)
     _check_times(probes, axes, problems)
     for planning in cast(Sequence[Planning], sections["plan"]):
         if planning.path_error is not None and way is None:

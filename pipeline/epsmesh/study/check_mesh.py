@@ -1,7 +1,7 @@
 """Physical sense of a mesh: its sizes, and whether they fit the body, the probe and the material."""
 
 from collections.abc import Sequence
-from math import isfinite, isinf
+from math import inf, isfinite, isinf
 
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import is_level
@@ -66,17 +66,23 @@ def check_chosen(meshes: Sequence[Mesh], problems: Problems) -> None:
             "cuts the body at epsilon in every case, and `accuracy` is that of the force of this column, not of the "
             'body: for F of the body omit outside and epsilon; to compare, add "full" to epsilon',
         )
-    if len(chosen) < len(meshes) or any(mesh.outside != "coarse" for mesh in chosen):
-        return
-    for mesh in chosen:
-        if "epsilon" in mesh.model_fields_set:
-            problems.error(
-                "mesh.epsilon",
-                "full" if isinf(mesh.epsilon) else in_mm(mesh.epsilon),
-                "has no effect with `accuracy`, for which all sizes are chosen. Omit one of the two, or cut the "
-                "body at "
-                'epsilon: outside = "free"',
-            )
+    idle = [mesh for mesh in chosen if mesh.outside == "coarse" and "epsilon" in mesh.model_fields_set]
+    if idle and len(chosen) == len(meshes) and all(mesh.outside == "coarse" for mesh in chosen):
+        radii = dict.fromkeys("full" if isinf(mesh.epsilon) else in_mm(mesh.epsilon) for mesh in idle)
+        problems.error(
+            "mesh.epsilon",
+            list(radii) if len(radii) > 1 else next(iter(radii)),
+            "has no effect with `accuracy`, for which all sizes are chosen. Omit one of the two, or cut the "
+            "body at "
+            'epsilon: outside = "free"',
+        )
+    elif any(isfinite(mesh.epsilon) for mesh in idle):
+        problems.error(
+            "mesh.outside",
+            "coarse",
+            "is one case for every epsilon with `accuracy`, for which all sizes are chosen. Omit it: "
+            '"full" in epsilon is the whole body',
+        )
 
 
 def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
@@ -191,14 +197,17 @@ def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems
             )
 
 
-def check_reference(meshes: Sequence[Mesh], axes: tuple[Axis, ...], problems: Problems) -> None:
-    """Warn of a study without a full-order case to compare with."""
-    if all(isfinite(mesh.epsilon) for mesh in meshes if mesh.accuracy is None):
-        if any(mesh.accuracy is not None for mesh in meshes):
-            return
+def check_reference(
+    meshes: Sequence[Mesh], axes: tuple[Axis, ...], placed: Sequence[tuple[Body, Probe]], problems: Problems
+) -> None:
+    """Warn of a study without a full-order case to compare with, and of an ε that is one under another name."""
+    epsilons = {mesh.epsilon for mesh in meshes if mesh.accuracy is None}
+    if any(map(isinf, epsilons)) or any(mesh.accuracy is not None for mesh in meshes):
+        return
+    farthest = max((body.farthest(probe.frame_on(body)) for body, probe in placed[:1]), default=inf)
+    if beyond := min((epsilon for epsilon in epsilons if epsilon >= farthest), default=None):
+        found, what = in_mm(beyond), 'extends beyond the body: write "full" in its place. Without a "full" case'
+    else:
         swept = any(axis.name == "epsilon" for axis in axes)
-        problems.warn(
-            "mesh.epsilon",
-            None,
-            f'{"the list has" if swept else "there is"} no "full" case: the dataset has no F_max, F/F_max and speed-up',
-        )
+        found, what = None, f'{"the list has" if swept else "there is"} no "full" case:'
+    problems.warn("mesh.epsilon", found, f"{what} the dataset has no F_max, F/F_max and speed-up")

@@ -23,6 +23,7 @@ SIZE = 9.0  # points
 # Letters of SIZE in an inch of a line, and in a line of the legend.
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone
+_MARGIN = 1.3  # of a logarithmic axis, below its least number
 _NARROW = 3.0  # below this ratio of its ends, even steps
 # What is of the program that draws, not of a figure: what matplotlib's own styles leave alone.
 _NO_STYLE = {
@@ -126,11 +127,15 @@ def write_above(ax: Axes, title: str, letters: int, columns: int) -> Legend:
 def log_scale(ax: Axes, which: str = "y") -> None:
     """Make an axis logarithmic, with round numbers written as people write them; not one without a positive number."""
     together = getattr(ax, f"get_shared_{which}_axes")().get_siblings(ax)
-    if not any(np.isfinite(getattr(one, f"{which}axis").get_minpos()) for one in together):
+    least = min(getattr(one, f"{which}axis").get_minpos() for one in together)
+    if not np.isfinite(least):
         return
     getattr(ax, f"set_{which}scale")("log")
     axis: Axis = getattr(ax, f"{which}axis")
     low, high = sorted(axis.get_view_interval())
+    if low <= 0:  # a margin of the linear axis
+        low = least / _MARGIN
+        getattr(ax, f"set_{which}lim")(low, high)
     if high < _NARROW * low:
         axis.set_major_locator(MaxNLocator(3 if which == "x" else 6))
         axis.set_minor_locator(NullLocator())
