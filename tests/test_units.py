@@ -46,7 +46,7 @@ REFUSED = {
     ("١٠ mm", "m"): "ARABIC-INDIC DIGIT ONE",
     ("", "m"): "the number comes first",
     ("10 kpa", "Pa"): "unknown unit `kpa`; did you mean kPa?",
-    ("10 mmHg", "Pa"): "unknown unit `mmHg`; allowed are Pa, kPa",
+    ("10 cmHg", "Pa"): "unknown unit `cmHg`; allowed are Pa, kPa",
     ("10 MM", "m"): "did you mean mm?",
     ("10 mm", "Pa"): "`mm` is no unit of a pressure",
     ("10 %*kPa", "Pa"): "`%*kPa` is no unit of a pressure",

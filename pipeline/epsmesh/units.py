@@ -58,7 +58,17 @@ _KINDS = {
     "Pa": _Kind(
         "a pressure",
         "10 kPa",
-        {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5, "mbar": 1e2, "N/m^2": 1.0, "N/mm^2": 1e6},
+        {
+            "Pa": 1.0,
+            "kPa": 1e3,
+            "MPa": 1e6,
+            "GPa": 1e9,
+            "bar": 1e5,
+            "mbar": 1e2,
+            "mmHg": 133.322387415,
+            "N/m^2": 1.0,
+            "N/mm^2": 1e6,
+        },
     ),
     "s": _Kind("a time", "10 ms", {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "min": 60.0, "h": 3600.0}),
     "Hz": _Kind("a frequency", "1 Hz", {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "1/s": 1.0}),

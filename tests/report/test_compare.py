@@ -2,10 +2,11 @@
 
 import json
 import re
+from math import inf
 
 import pytest
 
-from epsmesh.report.compare import compare
+from epsmesh.report.compare import compare, worded
 from epsmesh.report.dataset import build, write
 from epsmesh.report.parameters import units_of
 from epsmesh.report.study import DatasetError
@@ -50,6 +51,7 @@ def test_the_bars_of_both_decide(share, agrees):
 def test_a_finer_mesh_is_compared_and_told():
     found = compare(dataset(), other('fine = "2 mm"', 'fine = "1 mm"', seconds=lambda case: 3 * seconds(case)))
     assert [setting[0] for setting in found.settings] == ["mesh.fine"]
+    assert [worded("mesh.fine", size) for size in (2e-3, inf)] == ["2 mm", "chosen by the program"]
     assert found.times == pytest.approx((3.0, 3.0, 3.0))
 
 

@@ -186,7 +186,7 @@ def test_a_logarithmic_axis_begins_above_nought():
 
 @pytest.mark.parametrize("alike", [["coarse"], ["coarse", "free"]])
 def test_where_the_mesh_changes_no_force_there_is_no_error_to_draw(alike, tmp_path):
-    """Errors of nought have no place on a logarithmic axis: the others are drawn, and without any there is no figure."""
+    """Errors of nought have no place on a logarithmic axis: the others are drawn; without any there is no figure."""
     data = dataset(mesh={"epsilon": EPSILONS, "outside": ["coarse", "free"]})
     same = data["outside"].isin(alike)
     data["force_ratio"] = data["force_ratio"].where(~same, 1.0)

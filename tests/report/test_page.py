@@ -283,6 +283,10 @@ def test_the_commands_that_run_it_again_name_a_file_that_is_there(is_own, tmp_pa
     ("arguments", "words"),
     [
         (["report", "README.md"], "README.md: must be a dataset (.nc) or a study file (.toml)"),
+        *(
+            ([*words, "nosuch"], "nosuch: No such file or directory; `epsmesh new NAME` makes one")
+            for words in (["report"], ["guide"], ["compare", "quick"], ["plan"])
+        ),
         (["report", "none.nc"], "no such dataset; make it with `epsmesh run none.toml`"),
         (["report", "pyproject.toml", "--output", "/nowhere"], "no such dataset"),
         (["report", "{bad}"], "cannot be read as netCDF"),

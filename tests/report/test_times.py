@@ -64,6 +64,7 @@ def test_fewer_unknowns_that_were_slower_are_named(timed):
     timed["dofs"] = timed["dofs"].where(np.isinf(timed["epsilon"]), 900)
     assert doubts(timed) == []
     timed["speedup"].loc[{"epsilon": 4e-3, "outside": "free"}] = 0.7
+    assert doubts(timed)[0].endswith("the full order: 1 case, ε = 4 mm, outside free, 0.7 ×")
     timed["speedup"].loc[{"epsilon": 5e-3, "outside": "free"}] = 0.9
     (told,) = doubts(timed)
     assert told == "fewer unknowns were slower than the full order: 2 cases, most of all ε = 4 mm, outside free, 0.7 ×"

@@ -145,6 +145,14 @@ MISTAKES = {
         ["mesh.outside", "needs epsilon, at which the body is cut", "or omit outside"],
     ),
     "text for a truth": ({"solve": {"exact": "yes"}}, ['solve.exact = "yes"', "true or false"]),
+    "list for a truth": (
+        {"solve": {"timing": [True, False]}}, ["must be true or false: a list of `timing` is no sweep"],
+    ),
+    "list for a number": ({"solve": {"repeats": [1, 2]}}, ["must be a whole number: a list of `repeats` is no sweep"]),
+    "list for a name": (
+        {"body": {"layer": [{"name": ["rind", "x"], "thickness": "2 mm", "young": "1 kPa", "poisson": 0.3}]}},
+        ["body.layer[1].name", "must be text: a list of `name` is no sweep"],
+    ),
     "text for a list": ({"plan": {"without": "symmetry"}}, ["plan.without", 'must be a list, such as ["symmetry"]']),
     "cap of two coordinates": (
         {"load": {"traction": [{"on": {"around": ["9 mm", "0 mm"], "radius": "3 mm"}, "pressure": "1 kPa"}]}},
@@ -295,9 +303,9 @@ def test_each_mistake_gets_its_message(name):
 
 def test_all_mistakes_at_once():
     with pytest.raises(StudyError) as caught:
-        study(material={"young": 3, "poisson": 0.9}, probe={"radius": "x"}, mesh={"fien": "1 mm", "fine": None})
+        study(material={"young": 3, "poisson": 0.9}, probe={"radius": "x"}, mesh={"fien": "1 mm", "coarse": None})
     keys = {problem.key for problem in caught.value.problems}
-    assert keys == {"material.young", "material.poisson", "probe.radius", "mesh.fien", "mesh.fine"}
+    assert keys == {"material.young", "material.poisson", "probe.radius", "mesh.fien", "mesh.coarse"}
 
 
 SYNTAX = {
@@ -456,6 +464,41 @@ def test_several_materials_beside_layers_are_told_to_be_a_sweep():
     content = raw(body={"layer": layers}) | {"material": materials}
     (warning,) = (text for text in parse(content).warnings if "[[material]]" in text)
     assert "one material below the layers (a, b)" in warning
+
+
+MISSPELT = {
+    "probe": {"radius": "raduis"},
+    "mesh": {"epsilon": "epsylon"},
+    "material": {"young": "E"},
+    "body": {"shape": "shpae"},
+}
+
+
+@pytest.mark.parametrize("section", MISSPELT)
+def test_a_misspelt_key_is_one_error(section):
+    """That the key is then required is no second one, unless it is required of another table."""
+    content = raw()
+    ((right, wrong),) = MISSPELT[section].items()
+    content[section][wrong] = content[section].pop(right)
+    (line,) = refusal(content).splitlines()
+    assert f"{section}.{wrong}" in line
+    assert f"`{right}`" in line
+
+
+def test_what_another_table_lacks_is_reported_beside_a_misspelt_key():
+    first, second = ({"name": name, **raw()["probe"]} for name in ("a", "b"))
+    first["raduis"] = first.pop("radius")
+    del second["radius"]
+    found = refusal(raw() | {"probe": [first, second]})
+    assert "probe[1].radius" not in found
+    assert "probe[2].radius: is required" in found
+
+
+def test_a_misspelt_section_is_one_error():
+    content = raw()
+    content["msh"] = content.pop("mesh")
+    (line,) = refusal(content).splitlines()
+    assert "msh: unknown section; did you mean `mesh`?" in line
 
 
 def _cut(epsilon):

@@ -41,7 +41,7 @@ def test_what_does_not_fit_together_is_told_beside_what_cannot_be_read():
     content["probe"][1] |= {"contact": "frictionless", "motion": "all"}
     content["load"] = {"traction": [{"on": "lid", "pressure": "1 kPa"}]}
     assert {problem.key for problem in told(content).problems} == {
-        "mesh.fine", "material.poisson", "probe[4].shape", "probe[4].shap", "probe[2].motion", "load.traction[1].on",
+        "mesh.fine", "material.poisson", "probe[4].shap", "probe[2].motion", "load.traction[1].on",
     }  # fmt: skip
 
 

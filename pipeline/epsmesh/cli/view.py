@@ -196,10 +196,9 @@ def fields_of(
 def _write(study: "Study", fields: "Fields", stem: Path, export: str) -> None:
     """Write what was asked for, and say what is in it."""
     written = _written(study, fields, stem, export)
-    unknowns = f", {fields.dofs:,} unknowns" if fields.dofs else ""
     say(
         {"cells": len(fields.cells), "dofs": fields.dofs, "files": [str(path) for path in written]},
-        f"{len(fields.cells):,} elements{unknowns}",
+        fields.size,
         *(f"wrote {path}{remark}" for path, remark in written.items()),
     )
 

@@ -33,6 +33,14 @@ def by_name(file: Path) -> Path:
     return made if file.name == str(file) and not file.exists() and made.is_file() else file
 
 
+def _of_dataset(file: Path) -> Path:
+    """Return the file that is meant by a dataset's or a study's path or name; exit if a name is none."""
+    file = by_name(file)
+    if not file.suffix and not file.exists():
+        fail(of_file(file, f"No such file or directory{meant(file)}"))
+    return file
+
+
 def _all_by_name(files: list[Path]) -> list[Path]:
     return [by_name(file) for file in files]
 
@@ -50,7 +58,12 @@ File = Annotated[
     ),
 ]
 Dataset = Annotated[
-    Path, typer.Argument(metavar="FILE", help="A dataset (.nc), or a study with a dataset.", callback=by_name)
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="A dataset (.nc), or a study with a dataset, or its name in studies/.",
+        callback=_of_dataset,
+    ),
 ]
 Output = Annotated[Path, typer.Option(metavar="DIR", help="Folder of the results.")]
 ResultFolder = Annotated[

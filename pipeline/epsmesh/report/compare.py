@@ -7,7 +7,7 @@ sizes, degrees and ε, as long as all of the body is there, only tell how well i
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from statistics import median
 from typing import Any
 
@@ -204,6 +204,8 @@ def worded(key: str, value: Any, unit: str | None = None) -> str:
     if value in (None, ()):
         return "missing"
     name = key.rpartition(".")[2]
+    if value == inf and name in ("fine", "coarse"):
+        return "chosen by the program"
     if unit and isinstance(value, tuple):
         return ", ".join(worded(key, one, unit) for one in value)
     return write(name, value, unit) if unit or quantity_of(name) else str(value)

@@ -52,7 +52,7 @@ def slower(dataset: xr.Dataset) -> str:
         return ""
     worst = found.where(found == found.min(), drop=True)
     case = choices(dataset, {str(dim): worst[dim].values[0] for dim in dataset["speedup"].dims})
-    most = f"most of all {case}, {float(found.min()):.2g} ×"
+    most = f"{'most of all ' * (count > 1)}{case}, {float(found.min()):.2g} ×"
     return f"fewer unknowns were slower than the full order: {counted(count, 'case')}, {most}"
 
 

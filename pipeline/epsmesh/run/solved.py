@@ -140,7 +140,8 @@ def _attempt(
         available = FreeMemory(comm).available()
         check_memory(available, needed, "solving")
         room = bar and not lacks_memory(available, with_bar, "")
-        note(f"solving for {problem.dofs} unknowns")
+        part = ("", " of half of the body", " of a quarter of the body")[len(solve.mirrors)]
+        note(f"solving for {problem.dofs:,} unknowns{part}")
         # Of a history, fields are those of the elastic body.
         still = replace(case, probe=case.probe.model_copy(update={"history": None}), outputs=())
         has_bar = room or solve.goal is not None

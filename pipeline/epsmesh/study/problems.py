@@ -26,6 +26,9 @@ MOST_ERRORS = 50
 _MOST_VALUES = 4
 # Similarity from which a known name is suggested: `raster` is none for `step`.
 _ALIKE = 0.65
+# Types of errors that a list has where one value is expected.
+_OF_ONE = ("bool_type", "float_type", "int_type", "literal_error", "quantity", "string_type")
+_NAMED, _NUMBERED = re.compile(r"`(\w+)`"), re.compile(r"\[\d+\]")
 # A number and its unit: warnings that differ in nothing else are one.
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?\s?(%|mm\b)?")
 
@@ -152,6 +155,21 @@ class Problems:
             found[section] = tuple(one for one in found.get(section, ()) if bad is not None and one.name != bad)
         return {name: found[name] for name in sections}
 
+    def drop_consequences(self) -> None:
+        """Drop errors of what is required where it is there, under an unknown name: that is reported."""
+        meant = set()
+        for error in self.errors:
+            if error.allowed.startswith("unknown"):
+                for section in (error.key.rpartition(".")[0], _NUMBERED.sub("", error.key).rpartition(".")[0]):
+                    meant |= {f"{section}.{name}" if section else f"[{name}]" for name in _NAMED.findall(error.allowed)}
+
+        def is_consequence(error: Problem) -> bool:
+            section = error.key.rpartition(".")[0]
+            ways = {error.key, *(f"{section}.{name}" for name in _NAMED.findall(error.allowed))}
+            return "is required" in error.allowed and not meant.isdisjoint(ways)
+
+        self.errors[:] = [error for error in self.errors if not is_consequence(error)]
+
     def _problem(self, key: str, found: Any, allowed: str) -> Problem:
         section, dot, rest = key.partition(".")
         if dot and section in self._about:
@@ -182,6 +200,8 @@ class Problems:
             meant = other_name(where, key) if item["type"] == "extra_forbidden" else ""
             meant = meant or allowed({**item, "loc": place}, model)
             hint = OTHER_VALUES.get(key, {}).get(found.casefold(), "") if isinstance(found, str) else ""
+            if isinstance(found, list) and item["type"] in _OF_ONE:
+                meant = f"{meant.partition(', without')[0]}: a list of `{key}` is no sweep"
             self.error(f"{where}.{key}".rstrip("."), found, meant + hint)
 
     def _add(self, problems: list[Problem], problem: Problem) -> None:
@@ -268,6 +288,8 @@ def allowed(item: Any, model: type[BaseModel]) -> str:
             return _list_of(model, str(item["loc"][0]))
         case "float_type" | "int_type" as kind:
             return f"must be a {'whole ' * (kind == 'int_type')}number, without a unit or quotation marks"
+        case "string_type":
+            return "must be text"
         case "bool_type":
             return "must be true or false, without quotation marks"
         case "string_pattern_mismatch":

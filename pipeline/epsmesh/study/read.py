@@ -103,6 +103,7 @@ def parse(raw: Mapping[str, Any], *, file: str = "study", text: str = "", filled
     for one in further_ones:
         extra |= one.read(reading)
     outputs()
+    problems.drop_consequences()
     problems.errors[:] = [_at_home(problem, filled.borrowed) for problem in problems.errors]
     if problems.errors:
         raise StudyError(file, problems.named(problems.errors))

@@ -48,6 +48,12 @@ class Fields:
     young: FloatArray | None = None
 
     @property
+    def size(self) -> str:
+        """The numbers of elements and unknowns of the mesh shown, which is another one than a meridian's, in words."""
+        unknowns = f", {self.dofs:,} unknowns" if self.dofs else ""
+        return f"{len(self.cells):,} elements{unknowns}{' in three dimensions' * self.on_meridian}"
+
+    @property
     def contact(self) -> FloatArray:
         """The point round which ε is measured (m)."""
         return np.array(self.case.frame.point)

@@ -69,7 +69,7 @@ def render_scene(
 
 def _facts(fields: Fields) -> list[str]:
     """Return, in words, the case, its force and the size of its mesh."""
-    case, count = str(fields.case), f"{len(fields.cells):,} elements"
+    case = str(fields.case)
     facts = [case] if fields.case.axes else []
     of = "elastic " if fields.case.probe.history else ""
     if not isnan(fields.force):
@@ -77,7 +77,7 @@ def _facts(fields: Fields) -> list[str]:
         factor, unit = readable("force")
         force = barred(factor * fields.force, factor * abs(fields.force) * fields.force_error, unit)
         facts.append(f"{of}F = {force}{where}")
-    return [*facts, f"{count}, {fields.dofs:,} unknowns" if fields.dofs else count]
+    return [*facts, fields.size]
 
 
 def _inputs(fields: Fields) -> dict[str, Any]:

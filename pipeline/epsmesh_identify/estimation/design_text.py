@@ -20,12 +20,13 @@ def lines(design: Design) -> Iterator[str]:
     kinds = ("", " undeclared") if design.may_hide else ("",)
     head = ["test", "narrower", *(f"{title(name)}{kind}" for name in names for kind in kinds)]
     rows = [("as planned", "", design.planned)]
-    rows += [(one.words, f"{one.gain:.1f} times", one.widths) for one in design.ranked]
+    rows += [(one.words, _times(one.gain), one.widths) for one in design.ranked]
     table = [head, *([words, gain, *_cells(design, names, widths)] for words, gain, widths in rows)]
     sizes = [max(map(len, column)) for column in zip(*table, strict=True)]
     for row in table:
         yield "  ".join(cell.ljust(size) for cell, size in zip(row, sizes, strict=True)).rstrip()
     yield from _of_unseen(design)
+    yield "narrower: the geometric mean over all bars of a row."
     size, rho = percent(USUAL.level), USUAL.noise.correlation
     yield (
         f"Bars are half widths of 95 %, for noise of {size} of the largest force, {rho:g} correlated from one of the "
@@ -33,6 +34,10 @@ def lines(design: Design) -> Iterator[str]:
     )
     if design.may_hide:
         yield f"undeclared: {words_of_undeclared(design.may_hide)}."
+
+
+def _times(gain: float) -> str:
+    return f"{gain:.1f} times" if gain >= 1 else f"{1 / gain:.1f} times wider"
 
 
 def _cells(design: Design, names: list[str], widths: Widths) -> list[str]:

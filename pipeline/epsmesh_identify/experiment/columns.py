@@ -124,7 +124,9 @@ class Choice:
         for kind in order if any(header.text for header in headers) else ():
             free = [n for n in self._candidates(kind) if n not in {*chosen.values(), *self.table.strange}]
             chosen |= {kind: free[0]} if free else {}
-        units = {k: _text(_EXAMPLES[UNITS[k]]) for k, number in chosen.items() if not headers[number].unit}
+        rest = [n for n, header in enumerate(headers) if n not in chosen.values() and not header.unit]
+        bare = [k for k in order if (not headers[chosen[k]].unit if k in chosen else rest and k != "time")]
+        units = {kind: _text(_EXAMPLES[UNITS[kind]]) for kind in bare}
         return {kind: self._pasted(number) for kind, number in chosen.items()}, units
 
     def _pasted(self, number: int) -> str:

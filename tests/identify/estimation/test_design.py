@@ -105,7 +105,9 @@ def test_hidden_parts_widen_the_second_bar_and_a_second_ball_narrows_it():
     assert small.widths["young"][1] < large.widths["young"][1] < 0.6 * hidden
     assert small.gain > large.gain
     assert as_data(design)["ranked"][0]["gain"] == max(one.gain for one in design.ranked)
-    assert next(iter(lines(design))).split() == ["test", "narrower", "E", "E", "undeclared"]
+    head, *rows = lines(design)
+    assert head.split() == ["test", "narrower", "E", "E", "undeclared"]
+    assert "narrower: the geometric mean over all bars of a row." in rows
 
 
 def test_bars_are_those_that_fits_then_have():

@@ -52,6 +52,8 @@ def test_a_choice_is_left_to_the_user(tmp_path):
     assert table["columns"] == {"depth": "z", "force": "F", "time": "t"}
     assert set(table["units"]) == {"depth", "force", "time"}
     parse(raw() | block(said))
+    said = describe(write(tmp_path / "c.csv", {"stage": 1e3 * DEPTH, "force": 1e3 * FORCE}))
+    assert set(block(said)["measurement"][0]["units"]) == {"depth", "force"}  # of the column that is to be named, too
     said = describe(write(tmp_path / "b.csv", COLUMNS, change=lambda lines: lines[1:]))
     assert block(said)["measurement"][0]["columns"] == {"depth": 2, "force": 3}
 
