@@ -164,6 +164,19 @@ def test_depths_of_two_meshes_at_a_force_are_compared():
     assert compared == {"force": "agree", "depth": "agree"}
 
 
+def test_bars_of_what_grows_with_the_depth_have_the_error_of_the_depth():
+    """On a mesh that is too stiff, the depth is too small, and so is the stress there."""
+    disc, cut = {"shape": "disc", "radius": "5.5 mm", "force": "5 mN"}, {"epsilon": "6.5 mm", "outside": "fixed"}
+    naive = cut | {"fine": "1 mm", "coarse": "4 mm", "rim": "0.6 mm", "degree": 1}
+    mises = [{"name": "mises", "region": "body", "of": "von_mises", "reduce": "mean"}]
+    coarse, fine = (
+        solved(content(BOX, "linear", disc, mesh=mesh, output=mises))[-1] for mesh in (naive, cut | {"accuracy": "2 %"})
+    )
+    off = abs(float(coarse["mises"] - fine["mises"]))
+    of_depth = float(coarse["mises"] * coarse["depth_error"] / coarse["depth"])
+    assert float(coarse["mises_error"]) - of_depth < off < float(coarse["mises_error"])
+
+
 def test_fields_are_those_at_the_depth_of_the_force():
     study = RunnableStudy(parse(content(BOX, "linear", given(BALL, ["10 mN", "2 N"]))))
     solution = study.solve(probe_force="10 mN", comm=MPI.COMM_SELF)

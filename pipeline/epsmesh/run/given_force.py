@@ -19,6 +19,9 @@ from epsmesh.study.expected_depth import largest_depth
 from epsmesh.units import canonical
 
 _ENDED = "load steps end there"
+# Quantities that grow with the depth no faster than F, by whether their bars are relative.
+_RELATIVE = ("contact_area", "contact_radius", "energy_release")
+_ABSOLUTE = ("slip_area", "friction_force", "torque")
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,20 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     x, y, z = (found.times * one for one in record.force_vector)
     energy = found.times * found.depth / found.solved * record.energy
     force = canonical(found.times * record.force)
-    return replace(record, force=force, force_vector=(x, y, z), energy=energy)
+    off = max(found.exponent, 1.0) * found.error / found.depth
+    return replace(_barred(record, off), force=force, force_vector=(x, y, z), energy=energy)
+
+
+def _barred(record: Record, off: float) -> Record:
+    """Return the record with bars that cover another depth: F there is off by this share, all else by no more."""
+    wider: dict[str, Any] = {f"{name}_error": getattr(record, f"{name}_error") + off for name in _RELATIVE}
+    for name in _ABSOLUTE:
+        wider[f"{name}_error"] = getattr(record, f"{name}_error") + off * abs(getattr(record, name))
+    largest = dict(record.largest)
+    for name, value in record.largest.items():
+        if (bar := f"{name}_error") in largest:
+            largest[bar] += off * abs(value)
+    return replace(record, largest=largest, **wider)
 
 
 def _made(plan: Plan, depths: Mapping[tuple[int, ...], float], *, is_last: bool = False) -> _Round:
