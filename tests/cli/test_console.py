@@ -98,6 +98,16 @@ def test_colour_on_terminals_only_and_not_where_it_is_unwanted(epsmesh, tmp_path
             assert paint("x", "red", sys.stderr) == "x"
 
 
+def test_a_terminal_has_lines_broken_between_words(small):
+    text = on_terminal("plan", str(small), COLUMNS="50")
+    command = [sys.executable, "-m", "epsmesh", "plan", str(small)]
+    whole = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT, env=ENVIRONMENT).stdout
+    assert max(map(len, whole.splitlines())) > 80
+    assert max(map(len, text.splitlines())) <= 50
+    words = re.compile(r"[a-z-]{4,}")  # numbers are those of the moment
+    assert words.findall(text) == words.findall(whole)
+
+
 def test_json_of_a_run_is_one_object_with_what_failed_and_why(epsmesh, tmp_path):
     file = tmp_path / "small.toml"
     small = SMALL.replace('["coarse", "free"]', '"coarse"').replace('"0.5 mm"', '["1e-9 mm", "0.5 mm"]')

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from epsmesh.pages import json_in_page, marked
 from epsmesh.report import page
@@ -19,7 +20,7 @@ from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
 from epsmesh.report.headline import headline
 from epsmesh.report.page import render, write_page
 from epsmesh.report.page.cases import case_table
-from epsmesh.report.page.facts import reproduce
+from epsmesh.report.page.facts import reproduce, without_exact
 from epsmesh.report.page.inline import in_page
 from epsmesh.report.read import read_file
 from epsmesh.report.study import case_at, study_of
@@ -138,6 +139,27 @@ def test_page_needs_nothing_else(nasty):
 def test_names_in_the_page_are_unique(nasty):
     ids = Reader(nasty).ids
     assert len(ids) == len(set(ids))
+
+
+def test_a_tool_clear_of_the_body_lacks_no_exact_force():
+    data = small()
+    data["status"][:] = "ok"
+    data["status"][..., 0] = "no contact"
+    messages = xr.where(data["status"] == "no contact", "the tool touches nothing", "needs more memory")
+    data["force_exact_message"] = messages.astype(object)
+    (only,) = without_exact(data)
+    assert only["message"] == "needs more memory"
+    page = render(data, "small")
+    assert 'href="#no-exact"' in page
+    assert 'href="#failures"' not in page
+
+
+def test_ratios_have_no_more_digits_than_their_bars():
+    data = small()
+    exact = xr.full_like(data["force"], 1.0).assign_attrs(units="N")
+    data = data.assign(force_exact=exact, force_exact_error=0.02 * exact, force_exact_ratio=0.98765432 * exact)
+    (column,) = (one for one in case_table(data).columns if one.name == "force_exact_ratio")
+    assert {column.text(row) for row in range(exact.size)} == {"0.988"}
 
 
 def test_failures_come_first_and_say_why():

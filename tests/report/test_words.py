@@ -43,6 +43,20 @@ def test_both_ends_of_a_range_have_as_many_decimals(values, words):
 
 
 @pytest.mark.parametrize(
+    ("bar", "words"),
+    [
+        (0.025, "5.3 to 12.0 mN"),
+        (0.2, "5 to 12 mN"),
+        (3.0, "5 to 12 mN"),
+        (1e-4, "5.35 to 12.00 mN"),
+        (nan, "5.35 to 12.00 mN"),
+    ],
+)
+def test_a_range_has_no_more_digits_than_its_bar_leaves(bar, words):
+    assert span("force", (5.3456e-3, 12.001e-3), bar=bar) == words
+
+
+@pytest.mark.parametrize(
     ("value", "bar", "words"),
     [
         (31.0046, 0.2512, "31.00 ± 0.25 mN"),

@@ -2,7 +2,10 @@
 
 import json
 import os
+import re
+import shutil
 import sys
+import textwrap
 from contextvars import ContextVar
 from io import TextIOWrapper
 from math import inf, isfinite
@@ -14,6 +17,8 @@ from epsmesh.printable import printable_json, printable_lines
 # For the running command: whether the user wants JSON, and whether any was printed.
 JSON: ContextVar[dict[str, bool]] = ContextVar("JSON")
 _COLOURS = {"red": "31", "yellow": "33"}
+# What comes before the text of a line: its indentation, and columns apart from it.
+_BEFORE = re.compile(r"( *)(?:.*\S {2,})?")
 
 
 def paint(text: str, colour: str, stream: TextIO) -> str:
@@ -22,14 +27,34 @@ def paint(text: str, colour: str, stream: TextIO) -> str:
     return text if plain else f"\033[{_COLOURS[colour]}m{text}\033[0m"
 
 
+def fitted(text: str, stream: TextIO) -> str:
+    """Return ``text`` with lines as wide as the terminal that ``stream`` is, broken between words; else as it is."""
+    if not stream.isatty():
+        return text
+    lines, width = [], shutil.get_terminal_size().columns
+    wrapper = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
+    for line in text.split("\n"):
+        before = _BEFORE.match(line)
+        hang = (before.end() if before.end() <= width // 2 else before.end(1) + 2) if before else 0
+        wrapper.subsequent_indent = hang * " "
+        lines.append(wrapper.fill(line))
+    return "\n".join(lines)
+
+
+def tell(text: str) -> None:
+    """Print a text for people, which fits the terminal."""
+    print(fitted(text, sys.stdout))
+
+
 def error(text: str) -> None:
     """Print to standard error, in red."""
-    print(paint(printable_lines(text), "red", sys.stderr), file=sys.stderr, flush=True)
+    print(paint(fitted(printable_lines(text), sys.stderr), "red", sys.stderr), file=sys.stderr, flush=True)
 
 
 def warning(text: str) -> None:
     """Print a warning to standard error, in yellow."""
-    print(paint(f"warning: {printable_lines(text)}", "yellow", sys.stderr), file=sys.stderr, flush=True)
+    text = fitted(f"warning: {printable_lines(text)}", sys.stderr)
+    print(paint(text, "yellow", sys.stderr), file=sys.stderr, flush=True)
 
 
 def is_json_wanted() -> bool:

@@ -1,10 +1,11 @@
 """The command that answers from a dataset how large ε must be."""
 
+import sys
 from typing import Annotated
 
 import typer
 
-from epsmesh.cli.console import say
+from epsmesh.cli.console import fitted, say
 from epsmesh.cli.faults import DONE, SOME_FAILED, Fault, fail, of_file
 from epsmesh.cli.words import DEFAULT_OUTPUT, Dataset, Json, ResultFolder, read_dataset
 
@@ -53,5 +54,5 @@ def guide(
     except DatasetError as wrong:
         fail(of_file(file, str(wrong), _HOWTO))
     more = "" if verbose else "More: --verbose for corrections of F and what is missing, `epsmesh report` for figures."
-    say(found.to_dict(), found.text(verbose=verbose), *filter(None, [more]))
+    say(found.to_dict(), *(fitted(text, sys.stdout) for text in (found.text(verbose=verbose), more) if text))
     raise typer.Exit(DONE if found.answer else SOME_FAILED)

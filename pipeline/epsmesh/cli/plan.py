@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from epsmesh.cli.cases import find_case
-from epsmesh.cli.console import is_json_wanted, say, warning
+from epsmesh.cli.console import is_json_wanted, say, tell, warning
 from epsmesh.cli.faults import DONE, SOME_FAILED, fail, of_study, refusing
 from epsmesh.cli.words import (
     DEFAULT_OUTPUT,
@@ -222,8 +222,8 @@ def _show_forecasts(study: "Study", *, quiet: bool) -> dict[str, Any]:
     if not is_json_wanted():
         if not quiet:
             warn(study)
-        print(f"{study.file}: for `{study.does}`" if quiet else study.title)
-        print("\n".join(one.line for one in found))
+        tell(f"{study.file}: for `{study.does}`" if quiet else study.title)
+        tell("\n".join(one.line for one in found))
     return {"study": study.file, "warnings": list(study.warnings), "forecasts": [one.data for one in found]}
 
 
@@ -246,41 +246,41 @@ def _show(study: "Study", found: dict[str, Any], forecasts: "list[Forecast]", *,
     on = f"on {counted(found['ranks'], 'rank')}"
     cost = f"{format_seconds(found['seconds'])} {on}, {found['memory'] / 1e9:,.1f} GB for the largest step"
     if quiet:
-        print(f"{study.file}: {counted(found['cases'], 'case')}{nothing or f'; {to_do}; {cost}'}")
+        tell(f"{study.file}: {counted(found['cases'], 'case')}{nothing or f'; {to_do}; {cost}'}")
         return
     warn(study)
-    print(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}{nothing}")
+    tell(f"{study.title}: {counted(found['cases'], 'case')}{axes_of(study)}{nothing}")
     for skipped in found["skipped"]:
-        print(f"  {skipped['name']:13} {skipped['count']:6}  {skipped['reason']}")
+        tell(f"  {skipped['name']:13} {skipped['count']:6}  {skipped['reason']}")
     if (unasked := found["exact_unasked"])["scenes"]:
         more = format_seconds(unasked["seconds"])
-        print(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not computed: `exact = true` would add {more}.")
+        tell(f"  {'exact':13} {unasked['scenes']:6}  F_exact is not computed: `exact = true` would add {more}.")
     for note in found["notes"]:
-        print(f"  {note}")
+        tell(f"  {note}")
     if found["solves"]:
-        print(f"  {to_do}")
-        print(f"  estimate: {cost}")
+        tell(f"  {to_do}")
+        tell(f"  estimate: {cost}")
         ground = f"{counted(found['fitted_to'], 'case')} on record" if found["fitted_to"] else "no case on record yet"
         if (slower := found["machine"]) != 1:
             ground += f"; work of a kind without any gets {slower:.2g} times its usual time, as other work took"
-        print(
+        tell(
             f"    ({ground}; a step's time is typically right within a factor of {found['factor']:.1f}, "
             "on an idle machine; start-up and figures take a few seconds more)"
         )
         _list_steps(found["steps"], None if verbose else _MOST_STEPS)
     if rest := found["besides"]:
         most, seconds = counted(rest["solves"], "solve"), format_seconds(rest["seconds"])
-        print(f"  besides: up to {most}, {seconds} {on}: which are needed is found on the way")
+        tell(f"  besides: up to {most}, {seconds} {on}: which are needed is found on the way")
     for forecast in forecasts:
-        print(forecast.line)
+        tell(forecast.line)
 
 
 def _list_steps(steps: list[dict[str, Any]], most: int | None) -> None:
     """Print a line for each step, the costliest first."""
     for step in sorted(steps, key=lambda step: -step["seconds"])[:most]:
-        print(_line(step))
+        tell(_line(step))
     if most is not None and len(steps) > most:
-        print(f"    … and {len(steps) - most} smaller steps: --verbose lists them")
+        tell(f"    … and {len(steps) - most} smaller steps: --verbose lists them")
 
 
 def _tell(made: "Plan", records: "dict[str, Record]", case: "Case") -> None:

@@ -9,7 +9,7 @@ from epsmesh.quantities import write
 from epsmesh.report.insertion import answer
 from epsmesh.report.study import study_of
 from epsmesh.report.values import answer_of, at_peak, has_path, relative
-from epsmesh.report.words import barred, scale, span
+from epsmesh.report.words import barred, ranged, scale, span
 
 # Share of the largest depth by which the last one may be smaller of a tool that is held.
 _HELD = 1e-9
@@ -32,13 +32,13 @@ def _of_forces(dataset: xr.Dataset) -> str:
     """Return the force, or its range over the cases; of a given force, the depth."""
     name, size = answer_of(dataset), dataset["force"].size
     known, bar = int(np.isfinite(dataset["force"]).sum()), _largest_bar(dataset, name)
-    what, values = "F" if name == "force" else "The depth at the given force", span(name, dataset[name])
+    what = "F" if name == "force" else "The depth at the given force"
     if size == 1:
         return f"{what} = {_one(dataset, name)}{_depth(dataset)}."
     if known == 1:
         return f"One of {size} cases has a force. {what} = {_one(dataset, name)}."
     which = "" if known == size else f"{known} of {size} cases have a force. "
-    return f"{which}{what} is {values}{_place(dataset)}{bar and f'; the largest error bar is {bar}'}."
+    return f"{which}{what} is {ranged(dataset, name)}{_place(dataset)}{bar}."
 
 
 def _of_histories(dataset: xr.Dataset) -> str:
@@ -46,14 +46,17 @@ def _of_histories(dataset: xr.Dataset) -> str:
     peak, last = at_peak(dataset), _last(dataset["force"])
     depth, bar = abs(dataset["tool_depth"]), _largest_bar(peak, "force")
     is_held = bool((_last(depth) > (1 - _HELD) * depth.max("time")).all())
-    force, ends = span("force", peak["force"]), "relaxes to" if is_held else "ends at"
+    ends = "relaxes to" if is_held else "ends at"
     if last.size == 1:
         own = dataset["force"].squeeze().dropna("time")
+        share = float(relative(peak, "force_error").max())
         first, end = (write("time", float(time)) for time in (own["time"][int(abs(own).argmax())], own["time"][-1]))
-        return f"F = {_one(peak, 'force')} at its peak, at {first}; it {ends} {span('force', last)} at {end}."
+        return (
+            f"F = {_one(peak, 'force')} at its peak, at {first}; it {ends} {span('force', last, bar=share)} at {end}."
+        )
     least, most = (f"{100 * end(last / peak['force']):.3g}" for end in (np.nanmin, np.nanmax))
     shares = least if least == most else f"{least} to {most}"
-    return f"F is {force} at its peak and {ends} {shares} % of that{bar and f'; the largest error bar is {bar}'}."
+    return f"F is {ranged(peak, 'force')} at its peak and {ends} {shares} % of that{bar}."
 
 
 def _last(values: xr.DataArray) -> xr.DataArray:
@@ -68,7 +71,7 @@ def _of_paths(dataset: xr.Dataset) -> list[str]:
     if size == 1:
         return [f"{line[0].upper()}{line[1:]}." for line in [*answer(dataset), *_largest(dataset)]]
     pierced = np.isfinite(dataset["puncture_depth"].values).reshape(size, -1).any(axis=1).sum()
-    depth, force = (span(name, dataset[f"puncture_{name}"]) for name in ("depth", "force")) if pierced else ("", "")
+    depth, force = (ranged(dataset, f"puncture_{name}") for name in ("depth", "force")) if pierced else ("", "")
     where = f" at a depth of {depth}, with F = {force}" if pierced else ""
     found = f"The tissue is pierced in {pierced} of {size} cases{where}."
     return [found, f"At the depths of the paths: {_of_forces(at_peak(dataset))}"]
@@ -78,8 +81,7 @@ def _largest(dataset: xr.Dataset) -> Iterator[str]:
     """Yield the largest force of one path, and its depth."""
     peak = at_peak(dataset)
     if np.isfinite(peak["force"].item()):
-        force, depth = (span(name, peak[name]) for name in ("force", "depth"))
-        yield f"at the depths of the path, F is at most {force}, at {depth}"
+        yield f"at the depths of the path, F is at most {ranged(peak, 'force')}, at {span('depth', peak['depth'])}"
 
 
 def _place(dataset: xr.Dataset) -> str:
@@ -104,11 +106,10 @@ def _one(dataset: xr.Dataset, name: str) -> str:
     """Write the one value that is known, with its error bar and that as a share."""
     factor, unit = scale(dataset[name])
     value, bar = (factor * float(dataset[part].max()) for part in (name, f"{name}_error"))
-    share = _largest_bar(dataset, name)
-    return f"{barred(value, bar, unit)}{share and f' ({share})'}"
+    return f"{barred(value, bar, unit)}{_largest_bar(dataset, name, ' ({:.2g} %)')}"
 
 
-def _largest_bar(dataset: xr.Dataset, name: str) -> str:
-    """Write the largest relative error bar, "" if there is none."""
-    bars = relative(dataset, f"{name}_error").values
-    return f"{100 * np.nanmax(bars):.2g} %" if np.isfinite(bars).any() else ""
+def _largest_bar(dataset: xr.Dataset, name: str, words: str = "; the largest error bar is {:.2g} %") -> str:
+    """Write the largest relative error bar in ``words``, "" if there is none."""
+    bar = float(relative(dataset, f"{name}_error").max())
+    return words.format(100 * bar) if np.isfinite(bar) else ""

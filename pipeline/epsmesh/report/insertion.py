@@ -8,7 +8,7 @@ import xarray as xr
 from epsmesh.insertion.steps import INDENTATION, PHASES
 from epsmesh.quantities import write
 from epsmesh.report.values import punctures
-from epsmesh.report.words import barred
+from epsmesh.report.words import barred, decimals
 
 
 def answer(dataset: xr.Dataset) -> Iterator[str]:
@@ -42,13 +42,14 @@ def _lines(dataset: xr.Dataset) -> Iterator[str]:
     elif PHASES[int(last["phase"])] == INDENTATION:
         yield f"a tougher layer is indented down to {write('depth', float(last['depth']))}: F is {_last(last)}"
     else:
+        places = decimals(*(1e3 * float(last[name]) for name in ("force", "force_error")))
         parts = ", ".join(
-            f"{part} {1e3 * float(last[f'force_{part}']):.4g}" for part in ("elastic", "cutting", "friction")
+            f"{part} {1e3 * float(last[f'force_{part}']):.{places}f}" for part in ("elastic", "cutting", "friction")
         )
         yield f"cutting at {write('depth', float(last['depth']))}: F = {_force(last)} (in mN: {parts})"
     if back is not None and bool(np.isfinite(back["force"]).any()):
-        pulled = back["force"].dropna("depth").values * 1e3
-        first, end, least = (f"{force:.4g} mN" for force in (pulled[-1], pulled[0], pulled.min()))
+        pulled = back.isel(depth=np.flatnonzero(np.isfinite(back["force"].values)))
+        first, end, least = (_force(pulled.isel(depth=at)) for at in (-1, 0, int(pulled["force"].argmin())))
         further = "" if least in (first, end) else f"; its least value is {least}"
         yield f"withdrawal: F begins at {first} and ends at {end}{further}"
     worst = float(np.nanmax(np.abs(whole["energy_balance"].values)))

@@ -3,13 +3,14 @@
 import re
 from collections.abc import Mapping, Sequence
 from itertools import takewhile
-from math import floor, isfinite, log10
+from math import floor, isfinite, log10, nan
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from epsmesh import quantities
+from epsmesh.report.values import relative
 
 _NOUGHT = 1e-9  # what rounding leaves of no error
 _SPAN, _APART = 4, 0.01  # digits of the larger end of a range, and a share of it below which the other has its own
@@ -76,21 +77,28 @@ def time(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 0.9995 else f"{1e3 * seconds:.3g} ms"
 
 
-def span(name: str, values: Any, unit: str | None = None) -> str:
+def span(name: str, values: Any, unit: str | None = None, bar: float = nan) -> str:
     """Write the least and the largest value of a quantity with as many decimals: ``25.02 to 31.00 mN``.
 
     Once if they are the same, and without decimals that both lack; of values that are far apart, each with its own.
+    There are no more digits than a relative error ``bar`` of both leaves.
     """
     factor, word = quantities.readable(name, unit)
     low, high = factor * float(np.nanmin(values)), factor * float(np.nanmax(values))
     largest = max(abs(low), abs(high))
-    places = max(0, _SPAN - 1 - floor(log10(largest))) if largest else 0
+    digits = max(1, min(_SPAN, _OF_BAR - 1 - _power(bar))) if bar > 0 else _SPAN
+    places = max(0, digits - 1 - floor(log10(largest))) if largest else 0
     ends = [f"{end:.{places}f}" for end in (low, high)]
     while "." in ends[0] and all(end.endswith(("0", ".")) for end in ends):
         ends = [end[:-1] for end in ends]
     if min(abs(low), abs(high)) < _APART * largest:
-        ends = [f"{float(f'{end:.{_SPAN}g}'):.6g}" for end in (low, high)]
+        ends = [f"{float(f'{end:.{digits}g}'):.6g}" for end in (low, high)]
     return f"{' to '.join(dict.fromkeys(ends))} {word}".rstrip()
+
+
+def ranged(dataset: xr.Dataset, name: str) -> str:
+    """Write the range of a variable of ``dataset``, to the digits that its largest relative error bar leaves."""
+    return span(name, dataset[name], bar=float(relative(dataset, f"{name}_error").max()))
 
 
 def choices(coordinates: Mapping[Any, xr.DataArray], selection: Mapping[str, Any]) -> str:

@@ -22,7 +22,7 @@ PLACES = ("x", "y")
 _MOST_PANELS = 3
 _COLOURS = "cividis"
 _WHOLE = {"edgecolors": "face", "linewidth": 0.4}  # else gaps between cells are seen in a page
-_PANEL = 3.0  # inches: the width of a panel
+_PANEL, _BESIDE = 3.4, 0.8  # inches: the width of a panel, and the height of the scale below it and its texts
 # Beside the outline, as a share of the map.
 _ROOM = 0.03
 
@@ -36,9 +36,7 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
     facets = arrange(dataset, ("force",), None, flat=PLACES, most=(_MOST_PANELS, 1, 1))
     parts = [dataset.sel(facets.at | curve).transpose("y", "x", ...) for curve in facets.curves]
     titles = [choices(dataset, curve) for curve in facets.curves]
-    width, height = (float(np.ptp(dataset[name].values)) for name in PLACES)
-    panel = _PANEL * min(1.0, max(0.4, height / width))
-    figure = new_figure(_PANEL * len(parts) + 1.2, 2 * panel + 1.3)
+    figure = new_figure(_PANEL * len(parts) + 0.6, 2 * _PANEL)
     axes = figure.subplots(2, len(parts), squeeze=False, sharex=True, sharey=True)
     for row, (name, label) in enumerate((("force", heading(dataset["force"])), ("force_error", "error bar of F, mN"))):
         # Zero where there is no contact would leave no colours for the others.
@@ -51,8 +49,11 @@ def force_map(dataset: xr.Dataset, title: str, warning: str) -> Figure:
             ax.set_title(titles[column] if row == 0 else "")
             ax.set_xlabel(heading(dataset["x"]) if row == 1 else "")
             ax.set_ylabel(heading(dataset["y"], short=column > 0))
-            ax.tick_params(labelleft=True)  # on a phone a column is alone
-        figure.colorbar(drawn, ax=axes[row].tolist(), label=label)
+            # On a phone a column is alone.
+            ax.tick_params(labelleft=True)
+            figure.colorbar(drawn, ax=ax, label=label, location="bottom", aspect=30)
+    width, height = (float(np.ptp(ends)) for ends in (ax.get_xlim(), ax.get_ylim()))
+    figure.set_figheight(2 * (_PANEL * min(1.2, max(0.4, height / width)) + _BESIDE))
     tells = "The force at each place, seen from above, and below it its 95\N{NO-BREAK SPACE}% error bar."
     finish(figure, title, " ".join(filter(None, (tells, facets.note))), warning)
     return figure

@@ -58,6 +58,7 @@ _SHOWN = {
     "time_total",
 }
 _DIGITS = 4
+_RATIO = 1e-3  # the least error bar of F/F_exact, and that of F/F_max, for digits: four decimals
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,9 @@ def case_table(dataset: xr.Dataset) -> Table:
     dims = [str(dim) for dim in dataset["status"].dims]
     size = dataset["status"].size
     states = [str(state) for state in dataset["status"].values.ravel()]
-    dataset = dataset.assign({_SHARE: relative(dataset, "force_error")})
+    exact = relative(dataset, "force_exact_error").fillna(0.0).clip(min=_RATIO)
+    bars = {"force_ratio_error": xr.full_like(exact, _RATIO), "force_exact_ratio_error": exact}
+    dataset = dataset.assign(bars | {_SHARE: relative(dataset, "force_error")})
     study = study_of(dataset)
     stages = prod(len(axis) for axis in (study.axes if study else ()) if axis.is_stage)  # the last axis of a plan
     numbers = Column(
@@ -189,8 +192,7 @@ def _decimals(dataset: xr.Dataset, name: str, factor: float) -> list[int] | None
 def _rounded(value: float, name: str, factor: float) -> float | int:
     if name in ("dofs", "cells", "iterations"):
         return int(value)
-    # Ratios near 1 are distinguished by what they differ from it.
-    return float(f"{value * factor:.{_DIGITS + 2 if name in ('force_ratio', 'force_exact_ratio') else _DIGITS}g}")
+    return float(f"{value * factor:.{_DIGITS}g}")
 
 
 def _texts(name: str, values: Any, hint: str, *, is_filter: bool = False, is_first: bool = True) -> Column:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from epsmesh.report.times import doubts
 from epsmesh.report.values import by_case, relative
-from epsmesh.report.words import choices, span
+from epsmesh.report.words import choices, ranged
 from epsmesh.states import FAILED, NO_CONTACT, OK, PARTIAL, PENDING, SKIPPED
 
 # Of git, with a sign for changes that were not committed.
@@ -47,7 +47,7 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
     counts = {word: int((dataset["status"] == state).sum()) for state, word in _STATES.items()}
     found = [("cases", f"{dataset['status'].size}"), *((word, f"{count}") for word, count in counts.items() if count)]
     if dataset["force"].notnull().any():
-        found.append(("force", span("force", dataset["force"])))
+        found.append(("force", ranged(dataset, "force")))
     for values, text, unit in (
         (100 * relative(dataset, "force_error").values, "largest error bar", " %"),
         (dataset["balance"].values, "worst imbalance", ""),
@@ -56,7 +56,7 @@ def facts(dataset: xr.Dataset) -> list[tuple[str, str]]:
         if np.isfinite(values).any() and not (unit == " ×" and np.nanmax(values) == 1):
             found.append((text, f"{np.nanmax(values):.2g}{unit}"))
     if "depth_error" in dataset and dataset["depth"].notnull().any():
-        found.insert(1, ("depth", span("depth", dataset["depth"])))
+        found.insert(1, ("depth", ranged(dataset, "depth")))
     if any(name == "largest speed-up" for name, _ in found):
         found += [("speed-ups", text) for text in doubts(dataset)]
     if taken := _taken(dataset):
@@ -70,7 +70,7 @@ def by_status(dataset: xr.Dataset, status: str) -> list[dict[str, Any]]:
 
 
 def without_exact(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return why scenes have no F_exact, with some of their cases."""
+    """Return why scenes that the tool touches have no F_exact, with some of their cases."""
     return _by_message(dataset, "", "force_exact_message")
 
 
@@ -141,7 +141,7 @@ def _by_message(dataset: xr.Dataset, status: str, variable: str) -> list[dict[st
     states, messages = dataset["status"].values, by_case(dataset, variable).values
     found: dict[str, list[tuple[int, ...]]] = defaultdict(list)
     for index in np.ndindex(states.shape):
-        if messages[index] if not status else states[index] == status:
+        if states[index] == status if status else messages[index] and states[index] != NO_CONTACT:
             found[str(messages[index])].append(index)
     groups = sorted(found.items(), key=lambda item: -len(item[1]))
     return [

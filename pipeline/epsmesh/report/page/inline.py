@@ -93,7 +93,7 @@ def _place(ax: Axes) -> SubplotSpec | None:
 
 
 def _cuts(figure: Figure) -> tuple[list[float], float]:
-    """Return where (pt) a figure may be cut: left of columns, and of a legend or of scales of colours beside them.
+    """Return where (pt) a figure may be cut: left of columns, and of a legend beside them.
 
     A legend ends so far (pt) below the top; 0 without one.
     """
@@ -102,8 +102,7 @@ def _cuts(figure: Figure) -> tuple[list[float], float]:
     drawn = figure.canvas.get_renderer()
     lefts, key = dict[float, float](), 0.0
     for ax in figure.axes:
-        place = _place(ax)
-        found = {place.colspan.start if place else inf: (ax.yaxis if place else ax).get_tightbbox(drawn).x0}
+        found = {place.colspan.start: ax.yaxis.get_tightbbox(drawn).x0} if (place := _place(ax)) else {}
         if (legend := ax.get_legend()) and (box := legend.get_window_extent(drawn)).x0 > ax.bbox.x1:
             found[inf], key = box.x0, figure.bbox.height - box.y0 + _MARGIN
         lefts |= {number: min(left, lefts.get(number, left)) for number, left in found.items()}

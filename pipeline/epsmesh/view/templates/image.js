@@ -29,7 +29,7 @@ class Page {
     this.redraw();
     this.choose(this.chosen);
     this.drawSlices();
-    this.whole();
+    this.stage.whole(inputs);
   }
   list() {
     const list = document.getElementById("segments");
@@ -47,7 +47,7 @@ class Page {
   listen() {
     field("all").addEventListener("click", () => this.show(() => true));
     field("none").addEventListener("click", () => this.show(() => false));
-    field("whole").addEventListener("click", () => this.whole());
+    field("whole").addEventListener("click", () => this.stage.whole(inputs));
     const { canvas } = this.stage;
     let start = null;
     canvas.addEventListener("pointerdown", (event) => {
@@ -105,15 +105,6 @@ class Page {
       ...(one.cut ? ["# reaches the image's end"] : []),
     ];
     document.getElementById("body").textContent = [...notes, one.block].join("\n");
-  }
-  whole() {
-    const { low, high } = this.inputs;
-    const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
-    this.stage.follow(() => {
-      const reach = (along) => 1.1 * Math.max(...corners.map((corner) => Math.abs(corner.dot(along))));
-      const [right, up] = this.stage.basis();
-      return [vector([0, 0, 0]), reach(up), reach(right)];
-    });
   }
 
   // ---- a place ---------------------------------------------------------------------------------------------------

@@ -185,11 +185,21 @@ class Stage {
   }
 
   // ---- from where ----------------------------------------------------------------------------------------------
-  // Show what `find` returns, beside the panel, and again whenever the page has another size: a place, and half the
+  // Show what `find` returns, beside the panel and below the header, and again whenever the page has another size: a place, and half the
   // height and width that are to fit. Until somebody moves the camera.
   follow(find) {
     this.find = find;
     this.resize();
+  }
+  // All corners of a box.
+  whole({ low, high }) {
+    const centre = vector(low).add(vector(high)).multiplyScalar(0.5);
+    const half = vector(high).sub(centre).toArray();
+    this.follow(() => {
+      const reach = (along) => 1.1 * half.reduce((sum, side, i) => sum + side * Math.abs(along.getComponent(i)), 0);
+      const [right, up] = this.basis();
+      return [centre, reach(up), reach(right)];
+    });
   }
   resize() {
     const { canvas: { clientWidth: width, clientHeight: height }, camera, controls, radius } = this;
@@ -202,13 +212,15 @@ class Stage {
     Object.assign(camera, { top: radius, bottom: -radius, right: (radius * width) / height, left: (-radius * width) / height });
     Object.assign(camera, { near: 0, far: 100 * radius });
     const panel = width < 600 ? 0 : details.offsetWidth;
-    camera.setViewOffset(width, height, panel / 2, 0, width, height);
+    const { bottom } = document.querySelector("header").getBoundingClientRect();
+    const head = Math.min(bottom, height / 2); // texts of a narrow screen may be higher than it
+    camera.setViewOffset(width, height, panel / 2, -head / 2, width, height);
     if (this.find) {
       const [target, half, wide] = this.find();
       const back = camera.position.clone().sub(controls.target).setLength(50 * radius);
       controls.target.copy(target);
       camera.position.copy(target).add(back);
-      camera.zoom = radius / Math.max(half, (wide * height) / (width - panel));
+      camera.zoom = (radius / height) * Math.min((height - head) / half, (width - panel) / wide);
     }
     camera.updateProjectionMatrix();
     controls.update();

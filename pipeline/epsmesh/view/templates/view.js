@@ -11,7 +11,7 @@ class Page {
     tool.setAttribute("position", new THREE.BufferAttribute(tool_points, 3));
     this.stage.fill(this.stage.tool, tool.setAttribute("moved", new THREE.BufferAttribute(tool_moved, 3)));
     this.label();
-    field("whole").addEventListener("click", () => this.whole());
+    field("whole").addEventListener("click", () => this.stage.whole(inputs));
     field("close").addEventListener("click", () => this.close());
     field("colour").addEventListener("change", () => this.recolour());
     field("plane").addEventListener("change", () => this.replane());
@@ -19,7 +19,7 @@ class Page {
     for (const name of ["deformation", "edges", "ring", "probe", "marks"]) {
       field(name).addEventListener("input", () => this.stage.redraw());
     }
-    this.whole();
+    this.stage.whole(inputs);
     this.replane();
     this.recolour();
   }
@@ -34,17 +34,6 @@ class Page {
     field("ring").parentElement.hidden = !inputs.epsilon;
     document.querySelector(".ring + span").textContent = `ε = ${length(inputs.epsilon || 0)}`;
     for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = inputs.ink[name];
-  }
-  // All corners of the box round the body.
-  whole() {
-    const { low, high } = this.inputs;
-    const centre = vector(low).add(vector(high)).multiplyScalar(0.5);
-    const corners = Array.from({ length: 8 }, (_, k) => vector(low.map((end, i) => ((k >> i) & 1 ? high[i] : end))));
-    this.stage.follow(() => {
-      const reach = (along) => 1.2 * Math.max(...corners.map((corner) => Math.abs(corner.clone().sub(centre).dot(along))));
-      const [right, up] = this.stage.basis();
-      return [centre, reach(up), reach(right)];
-    });
   }
   close() {
     const half = 3 * this.inputs.tool;

@@ -22,7 +22,7 @@ const turned = (line) => new THREE.LatheGeometry(line.map((point) => new THREE.V
 
 // The tool above its lowest point, with a shaft; a disc has the mean curvature of the face.
 function geometryOf({ tool, radius, angle, length, width, bend }) {
-  const long = 4 * radius;
+  const long = 2.5 * radius;
   if (tool === "blade") return new THREE.BoxGeometry(length, width, width).translate(0, 0, 0.51 * width);
   if (tool === "disc") {
     // A little above the face, which it would else fight with for the same pixels.
@@ -143,8 +143,8 @@ class Page {
   }
   whole() {
     this.stage.follow(() => {
-      const centre = vector(this.inputs.centre).addScaledVector(this.stage.basis()[1], 0.25 * this.size);
-      return [centre, 1.05 * this.size, this.size];
+      const centre = vector(this.inputs.centre).addScaledVector(this.stage.basis()[1], 0.1 * this.size);
+      return [centre, 0.9 * this.size, this.size];
     });
   }
 
