@@ -59,6 +59,27 @@ def test_bars_hold_the_shares_of_a_finer_mesh(changes):
     assert (np.diff(coarse["influence_radius"]) > 0).all()
 
 
+@pytest.mark.nightly
+def test_bars_of_distances_hold_where_cells_are_as_large_as_the_distance():
+    body = {"shape": "box", "size": ["36 mm", "32 mm", "19 mm"], "fixed": "bottom"}
+    cone = {"shape": "cone", "angle": "70 deg", "radius": "9.5 mm", "tip": "1.2 mm", "depth": "0.5 mm"}
+    sizes = {
+        "epsilon": "10 mm",
+        "fine": "3.2 mm",
+        "coarse": "8 mm",
+        "rim": "0.1 mm",
+        "growth": 0.8,
+        "outside": "coarse",
+    }
+    asked = {"body": body, "probe": cone | {"contact": "unilateral"}, "material": {"young": "20 kPa", "poisson": 0.5}}
+    coarse, fine = (
+        build(plan := make_plan(parse(asked | {"mesh": mesh, "solve": ASKED})), compute(plan, MPI.COMM_SELF))
+        for mesh in (sizes, {"accuracy": "0.15 %"})
+    )
+    off = np.abs(coarse["influence_radius"] - fine["influence_radius"]) / coarse["influence_radius_error"]
+    assert 0.5 < off.max() < 1
+
+
 def test_distances_are_from_the_first_touch():
     """A ball inclined by 20° touches 1.8 mm beside its axis, and presses by d cos 20° across the surface."""
     inclined = dataset(probe=BALL | {"axis": [0.342, 0.0, -0.9397]}, mesh={"rim": "0.5 mm"})

@@ -47,7 +47,7 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
         "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.way.element),
         text_of(case.solve, ("timing", "repeats", "exact", "influence")),
         *tail,
-        *(["influence"] if case.solve.influence else []),
+        *(["influence, decays in cells"] if case.solve.influence else []),
         *_spread_text(case),
         *map(_output_text, case.outputs),
         *_rim_text(case),

@@ -26,6 +26,8 @@ from epsmesh.study.influence import DECIDED
 _QUADRATURE, _CHUNK = 6, 20_000
 # Distances at which sums are read, from the least on, in units of the largest; they are interpolated between.
 _LEAST, _DISTANCES = 1e-4, 2_000
+# The exponent of the distance in the density of energy that a point force leaves.
+_DECAY = -4
 # Least change of a region's share, in units of what changes anywhere in it; of its effect of ν, which may vanish by
 # chance, in units of the bars of all regions times its share: without, 2 of 32 values were outside, by up to 1.6 times.
 _POINTWISE = 0.1
@@ -59,17 +61,19 @@ def sums_of_influence(
         return np.asarray(np.bincount(places, works.ravel(), minlength=size), dtype=float)
 
     # Sums by region, of E and of ν: here, in one degree more, and of changes.
-    regions, within = np.zeros((2, 3, count)), np.zeros((3, size))
+    regions, within = np.zeros((2, 3, count)), np.zeros((4, size))
     for cells, distances, volumes in _points(state, centre):
         for number, name in enumerate(("young", "poisson")):
             own, other = (getattr(one, name)[cells] * volumes.sum(axis=1) for one in (state.influence, above))
             parts = own, other, np.abs(other - own)
             regions[number] += [np.bincount(numbers[cells], one, minlength=count) for one in parts]
         here, finest = (one.young[cells, None] * volumes for one in (state.influence, above))
-        middles = distances.mean(axis=1)
-        # By distance: here, with each cell at one distance, and in one degree more.
-        whole = here.sum(axis=1)
-        within += [by_distance(distances, here), by_distance(middles, whole), by_distance(distances, finest)]
+        middles, whole = distances.mean(axis=1), here.sum(axis=1)
+        steep = here * distances**_DECAY
+        steep *= np.divide(whole, steep.sum(axis=1), out=np.zeros_like(whole), where=whole > 0)[:, None]
+        # By distance: here, in one degree more, with each cell at one distance, and with a decay within each cell.
+        within[:2] += [by_distance(distances, one) for one in (here, finest)]
+        within[2:] += [by_distance(middles, whole), by_distance(distances, steep)]
     regions, within = (2.0 ** len(body.mirrored) * global_sum(comm, sums) for sums in (regions, within))
     radii = np.array([_radii(np.cumsum(one), edges[1:]) for one in within])
     share, of_poisson = regions[0, 0], _bar_of_sums(*regions[1])
@@ -103,14 +107,14 @@ def _bar_of_sums(here: FloatArray, above: FloatArray, changed: FloatArray) -> Fl
     return CHANGES * np.maximum(np.abs(here - above), _POINTWISE * changed)
 
 
-def _bar_of_radii(here: FloatArray, by_cell: FloatArray, above: FloatArray) -> FloatArray:
-    """Return the bar of distances; the size of cells adds to it: ``by_cell``, where each cell is at one distance.
+def _bar_of_radii(here: FloatArray, above: FloatArray, by_cell: FloatArray, steep: FloatArray) -> FloatArray:
+    """Return the bar of distances; the size of cells adds to it, by two other distributions of the sum of each cell.
 
     A change may vanish by chance: the bar of each has what all change on average.
     """
-    changes = [np.abs(other / here - 1) for other in (above, by_cell)]
-    of_degree, of_size = (np.maximum(change, np.sqrt(np.nanmean(change**2))) for change in changes)
-    return np.asarray(here * (CHANGES * of_degree + of_size))
+    changes = [np.abs(other / here - 1) for other in (above, by_cell, steep)]
+    of_degree, *of_size = (np.maximum(change, np.sqrt(np.nanmean(change**2))) for change in changes)
+    return np.asarray(here * (CHANGES * of_degree + np.maximum(*of_size)))
 
 
 def _points(state: State, centre: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
