@@ -15,7 +15,7 @@ from PIL import Image
 from epsmesh.arrays import IntArray
 from epsmesh.files import atomic
 from epsmesh.report.figures.insertion import with_puncture
-from epsmesh.report.figures.style import COLOURS, DEFAULTS, GRID, LINE, PAPER
+from epsmesh.report.figures.style import COLOURS, DEFAULTS, GRID, LINE, PAPER, STEPS
 from epsmesh.view.frames import frames_of
 from epsmesh.view.palette import TOOL
 from epsmesh.view.pictures import Pictures
@@ -51,7 +51,7 @@ def write_film(pictures: Pictures, file: Path, title: str) -> Path:
             pictures.draw(panels, frame)
             if not seen:
                 for panel, colours in zip(panels, pictures.colours, strict=False):
-                    figure.colorbar(colours, ax=panel, label="displacement (mm)", shrink=0.8)
+                    figure.colorbar(colours, ax=panel, label="displacement, mm", shrink=0.8)
                 figure.tight_layout()
             dot.set_data([_MM * frame.depth], [_MM * frame.force])
             canvas.draw()
@@ -94,4 +94,5 @@ def _draw_force(ax: Axes, path: xr.Dataset) -> None:
         ax.plot(_MM * back["depth"], _MM * back["force"], color=COLOURS[4])
     ax.axhline(0, color=LINE, linewidth=0.6)
     ax.grid(color=GRID)
-    ax.set(xlabel="depth of the tip (mm)", ylabel="force (mN)")
+    ax.locator_params(steps=STEPS)
+    ax.set(xlabel="depth of the tip, mm", ylabel="reaction force F, mN")

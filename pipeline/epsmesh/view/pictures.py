@@ -17,7 +17,7 @@ from matplotlib.colors import Normalize
 
 from epsmesh.arrays import FloatArray
 from epsmesh.insertion.steps import WITHDRAWAL
-from epsmesh.report.figures.style import COLOURS, LINE, QUIET
+from epsmesh.report.figures.style import COLOURS, LINE, QUIET, STEPS
 from epsmesh.run.problem import law_of, meridian_problem
 from epsmesh.shapes.insertion import Needle
 from epsmesh.shapes.probes.blade import Blade
@@ -146,14 +146,16 @@ class Pictures:
         is_cut = bool(across) and not frame.is_whole and self._reach <= _RING
         ax.set(
             aspect="equal",
-            xlabel="along the crack (mm)" if is_cut else "across the tool (mm)",
-            ylabel="height (mm)",
+            xlabel="along the crack, mm" if is_cut else "across the tool, mm",
+            ylabel="height, mm",
             title=f"{frame.phase}, {_MM * frame.depth:.3g} mm",
             xlim=np.multiply(_MM * last, (-_SIDE, _SIDE)),
             ylim=np.multiply(_MM * last, (-_BELOW, _ABOVE)),
         )
         for panel in across:
             self._draw_across(panel, is_whole=frame.is_whole)
+        for panel in panels:
+            panel.locator_params(steps=STEPS)
 
     def _draw_tissue(self, ax: Axes, frame: Frame) -> None:
         """Draw the nearest state that is solved: of the intact body, or of the slit; or the crack round a needle."""
@@ -201,7 +203,7 @@ class Pictures:
         ax.fill(radius * np.cos(angles), radius * np.sin(angles), color=TOOL, zorder=3)
         side = _BESIDE * max(radius, _MM * self.half)
         ax.set(xlim=(-side, side), ylim=(-side, side), title="across, deep in tissue")
-        ax.set_xlabel("across the tool (mm)" if self._reach > _RING else "along the crack (mm)")
+        ax.set_xlabel("across the tool, mm" if self._reach > _RING else "along the crack, mm")
 
     def _outline(self, depth: float) -> FloatArray:
         """Return the outline (2, n) in m of the tool with its tip at a ``depth`` (m)."""

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from epsmesh.quantities import write
 from epsmesh.report.figures.facets import Facets
-from epsmesh.report.figures.style import FAILED, LEGEND, WIDTH, log_scale, look, new_figure
+from epsmesh.report.figures.style import FAILED, LEGEND, STEPS, WIDTH, log_scale, look, new_figure
 from epsmesh.report.words import choices, heading, is_numeric, lengths, scale
 from epsmesh.states import FAILURES
 
@@ -26,7 +26,6 @@ _LINEAR = {"depth"}  # F over it is read as a stiffness
 _WORD, _LINE, _TITLE, _LABEL = 14, 32, 34, 26
 _MARKED = 40  # points of a curve up to which each has a marker and a bar
 BARS = {"capsize": 2, "elinewidth": 0.8}
-_STEPS = [1, 2, 5, 10]  # of ticks: 2.5 takes one more digit
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def grid(
         for ax, (row, quantity) in zip(axes[:, j], rows, strict=True):
             panels.append(Panel(ax, dataset.sel(one.at | row | column), quantity, j, one))
             for axis in (ax.xaxis, ax.yaxis):
-                axis.set_major_locator(MaxNLocator("auto", steps=_STEPS))
+                axis.set_major_locator(MaxNLocator("auto", steps=STEPS))
             if quantity == quantities[0]:
                 ax.set_title(textwrap.fill(choices(dataset, row | column), _TITLE))
             ax.set_ylabel(textwrap.fill(heading(dataset[quantity], short=j > 0), _LABEL))

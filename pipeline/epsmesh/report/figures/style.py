@@ -20,6 +20,7 @@ COLOURS = ("#00204d", "#1f5fa8", "#2a9d8f", "#b87d00", "#b0413e", "#9030f0", "#4
 MARKERS = "osD^vPX"
 CLAIM, FAILED, QUIET, LINE, GRID, PAPER = "#d81b60", "#c62828", "#555555", "#000000", "#dddddd", "#ffffff"
 SIZE = 9.0  # points
+STEPS = [1, 2, 5, 10]  # of ticks: 2.5 takes one more digit
 # Letters of SIZE in an inch of a line, and in a line of the legend.
 _LETTERS, _LEGEND_LETTERS = 13, 24
 _DECADES = {"x": 1.4, "y": 2.2}  # from here on a logarithmic axis writes powers of ten alone

@@ -37,6 +37,7 @@ _PANEL, _LEGEND_LINE, _LETTERS = 2.9, 0.17, 34  # inches: of a panel with its le
 # What is drawn below the force where a study has it; those that are shares of something have a line at 1.
 _WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "force_exact_ratio")
 _SHARES = ("linear_ratio", "force_exact_ratio")
+_NOUGHT = {"sag": 1e-9}  # m: what the solver leaves of none
 # What is drawn below the force over time, and what is a curve first.
 _OVER_TIME = ("tool_depth", "dissipated_energy")
 _OF_HISTORY = ("ramp", "hold", "frequency", "amplitude", "probe", "material")
@@ -241,7 +242,7 @@ def _varies(dataset: xr.Dataset, name: str) -> bool:
     """Tell whether ``dataset`` has values of a quantity, other than nought."""
     if name not in dataset or (name == "linear_ratio" and "law" not in dataset.dims):
         return False
-    return bool((np.isfinite(dataset[name]) & (dataset[name] != 0)).any())
+    return bool((abs(dataset[name]) > _NOUGHT.get(name, 0.0)).any())
 
 
 def _name_curves(panel: Panel, at: str) -> int:
