@@ -148,7 +148,7 @@ def test_needles_of_two_toughnesses_are_two_scenes_whose_forces_are_told():
     tough, weak = needle(5), needle(4)
     assert compare(tough, tough).agrees
     one, other = (1e3 * float(each["force"].max()) for each in (tough, weak))
-    with pytest.raises(DatasetError, match=r"probe\.toughness is 5 J/m\^2 in A, 4 J/m\^2 in B") as told:
+    with pytest.raises(DatasetError, match=r"probe\.toughness is 5 J/m² in A, 4 J/m² in B") as told:
         compare(tough, weak)
     less = re.search(r"B less A is (\S+\.(\d+)) ± \d+\.\d+ mN", str(told.value))
     assert float(less[1]) == pytest.approx(other - one, abs=0.501 * 10.0 ** -len(less[2]))

@@ -84,7 +84,7 @@ def nasty():
 @pytest.fixture
 def without_figures(monkeypatch):
     """For what the page says: drawing its figures takes seconds."""
-    monkeypatch.setattr(page, "_figures", lambda _: [])
+    monkeypatch.setattr(page, "choose", lambda _: [])
 
 
 def test_what_comes_from_the_study_stays_text(nasty):

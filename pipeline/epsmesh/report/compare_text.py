@@ -8,7 +8,7 @@ import pandas as pd
 
 from epsmesh.printable import counted
 from epsmesh.quantities import readable
-from epsmesh.report.compare import Comparison, Pair, worded
+from epsmesh.report.compare import Comparison, worded
 from epsmesh.report.words import percent
 
 # Cases that a list names; the JSON has all of them.
@@ -40,7 +40,9 @@ def text(found: Comparison, names: tuple[str, str], doubts: dict[str, list[str]]
     lines += _listed([f"  not compared: {case}: {why}" for case, why in found.not_compared])
     if found.apart:
         lines += _apart(found)
-    if largest := max((pair for pair in found.pairs if pair.state == "agree"), key=_size, default=None):
+    if largest := max(
+        (pair for pair in found.pairs if pair.state == "agree"), key=lambda pair: abs(pair.difference), default=None
+    ):
         lines.append(
             f"largest difference within the bars: {percent(largest.difference)} (bars {percent(largest.bars)}), "
             f"{largest.quantity}, {largest.case}"
@@ -90,7 +92,3 @@ def _apart(found: Comparison) -> list[str]:
 
 def _listed(lines: list[str]) -> list[str]:
     return lines if len(lines) <= _MOST else [*lines[:_MOST], f"  … and {len(lines) - _MOST} more: --json has all"]
-
-
-def _size(pair: Pair) -> float:
-    return abs(pair.difference)

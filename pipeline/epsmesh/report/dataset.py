@@ -53,10 +53,6 @@ def _has_slit(case: Case) -> bool:
     return case.way.motion is Motion.SLIT
 
 
-def _may_end_early(case: Case) -> bool:
-    return case.way.has_steps or case.probe.force is not None
-
-
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
 _COUNTS = ("dofs", "cells", "iterations")
 _OF_SHAPE = ("unloading", "round_trip")
@@ -69,7 +65,7 @@ _PARTS = (
         of=lambda case: case.way.is_found,
     ),
     _Part(_OF_FRICTION, of=lambda case: case.way.rubs),
-    _Part(("depth_reached", "force_reached"), of=_may_end_early),
+    _Part(("depth_reached", "force_reached"), of=lambda case: case.way.has_steps or case.probe.force is not None),
     _Part(("surface_deviation",), of=lambda case: isinstance(case.body, Scanned)),
     _Part((*LARGEST, *_COUNTS)),
     _Part(("force_exact", "force_exact_error"), is_exact=True),

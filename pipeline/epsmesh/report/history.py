@@ -207,7 +207,9 @@ def last_stage(dataset: xr.Dataset) -> xr.Dataset:
     found = {name: dataset[name].sum(_STEP) for name in _SUMS if name in dataset}
     found |= {name: dataset[name].max(_STEP) for name in _LARGEST if name in dataset}
     found |= {name: xr.apply_ufunc(_first, dataset[name], input_core_dims=[[_STEP]], vectorize=True) for name in _TEXTS}
-    found["status"] = xr.apply_ufunc(_worst, dataset["status"], input_core_dims=[[_STEP]], vectorize=True)
+    found["status"] = xr.apply_ufunc(
+        lambda states: worst([*map(str, states)]), dataset["status"], input_core_dims=[[_STEP]], vectorize=True
+    )
     kept = {
         name: values.astype(dataset[name].dtype).transpose(*last[name].dims).assign_attrs(dataset[name].attrs)
         for name, values in found.items()
@@ -218,10 +220,6 @@ def last_stage(dataset: xr.Dataset) -> xr.Dataset:
 
 def _first(texts: np.ndarray) -> str:
     return next((str(text) for text in texts if text), "")
-
-
-def _worst(states: np.ndarray) -> str:
-    return worst([str(state) for state in states])
 
 
 def _table(dataset: xr.Dataset, name: str, dims: list[str]) -> FloatArray:

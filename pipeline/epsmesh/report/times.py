@@ -3,7 +3,6 @@
 import numpy as np
 import xarray as xr
 
-from epsmesh.arrays import BoolArray
 from epsmesh.printable import counted
 from epsmesh.report.words import choices
 
@@ -58,7 +57,7 @@ def slower(dataset: xr.Dataset) -> str:
 
 def _of_load(dataset: xr.Dataset) -> str:
     """Say how many times were taken while more processes wanted to run than there are cores."""
-    taken = _timed(dataset)
+    taken = np.isfinite(dataset["time_total"].values)
     if "machine_load" not in dataset or not taken.any():
         return ""
     load = dataset["machine_load"].values
@@ -73,7 +72,3 @@ def _of_spread(dataset: xr.Dataset) -> str:
     if "time_spread" not in dataset or not (dataset["time_spread"] > _SPREAD).any():
         return ""
     return f"repeats of a case are up to {100 * float(dataset['time_spread'].max()):.0f} % apart"
-
-
-def _timed(dataset: xr.Dataset) -> BoolArray:
-    return np.asarray(np.isfinite(dataset["time_total"].values))

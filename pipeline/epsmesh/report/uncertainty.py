@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from epsmesh.plan.plan import Plan
-from epsmesh.plan.work import EndPlans
 from epsmesh.quantities import attributes
 from epsmesh.report.influence import SPREAD
 from epsmesh.report.values import at_peak
@@ -47,15 +46,13 @@ def force_image_uncertainty(plan: Plan, force: xr.DataArray, force_of: ForceOf) 
     """
     squares = np.zeros(force.shape)
     for end in (end for end in plan.ends if end.of_image):
-        found = [abs(_like(force_of(one), force).transpose(*force.dims) - force).values for one in _there(end)]
+        found = [
+            abs(_like(force_of(one), force).transpose(*force.dims) - force).values for one in (end.low, end.high) if one
+        ]
         squares += np.fmax.reduce([np.full(force.shape, np.nan), *found]) ** 2
     bodies = [body for body in plan.study.sections["body"] if is_uncertain(body)]
     comment = "; ".join(dict.fromkeys(map(_range, bodies)))
     return force.copy(data=np.sqrt(squares)).assign_attrs(attributes(IMAGE) | {"comment": comment}).rename(IMAGE)
-
-
-def _there(end: EndPlans) -> list[Plan]:
-    return [plan for plan in (end.low, end.high) if plan is not None]
 
 
 def _range(body: Segmented) -> str:

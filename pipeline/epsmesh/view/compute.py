@@ -46,7 +46,8 @@ def compute_fields(
     if mesh_only:
         arrays = modelled_arrays(solve, comm, cache, note)
         return _whole(solve, arrays) if arrays is not None else None
-    solved = solve_fields(solve, comm, bar=bar, influence=_has_image(solve), cache=cache, note=note)
+    has_image = any(tissue.varying is not None and tissue.varying.file is not None for tissue in solve.case.tissues)
+    solved = solve_fields(solve, comm, bar=bar, influence=has_image, cache=cache, note=note)
     if wider := change_with_wider_voxels(solved):
         size, change = wider
         note(
@@ -54,10 +55,6 @@ def compute_fields(
             f"{100 * change:+.2g} %"
         )
     return fields_of(solved, stress=stress)
-
-
-def _has_image(solve: Solve) -> bool:
-    return any(tissue.varying is not None and tissue.varying.file is not None for tissue in solve.case.tissues)
 
 
 def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:

@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from epsmesh.quantities import write
 from epsmesh.report.figures.facets import Facets
@@ -64,8 +63,7 @@ def grid(
     for j, (one, column) in enumerate(columns):
         for ax, (row, quantity) in zip(axes[:, j], rows, strict=True):
             panels.append(Panel(ax, dataset.sel(one.at | row | column), quantity, j, one))
-            for axis in (ax.xaxis, ax.yaxis):
-                axis.set_major_locator(MaxNLocator("auto", steps=STEPS))
+            ax.locator_params(steps=STEPS)
             if quantity == quantities[0]:
                 ax.set_title(textwrap.fill(choices(dataset, row | column), _TITLE))
             ax.set_ylabel(textwrap.fill(heading(dataset[quantity], short=j > 0), _LABEL))

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 from shlex import quote as shell
-from typing import Any
 from urllib.parse import quote
 
 import xarray as xr
@@ -70,7 +69,9 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         failures=failures,
         without_exact=without_exact(dataset),
         warnings=warnings_of(dataset),
-        figures=_figures(over_time),
+        figures=[
+            in_page(figure(over_time, kind, titled=False), kind) for kind in choose(over_time) if kind != "nothing"
+        ],
         guide=guide,
         settings=settings(guide.verdicts, guide.scenes, has_full=guide.has_full) if guide else None,
         answer=[guide.sentence] if guide else headline(over_time),
@@ -88,8 +89,3 @@ def render(dataset: xr.Dataset, name: str, scene: str = "") -> str:
         commands=reproduce(dataset, name),
         turn=f"epsmesh report {shell(f'results/{name}.nc')} --scene answer",
     )
-
-
-def _figures(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the figures that suit the study as SVG, with what to see."""
-    return [in_page(figure(dataset, kind, titled=False), kind) for kind in choose(dataset) if kind != "nothing"]
