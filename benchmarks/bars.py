@@ -1,0 +1,284 @@
+"""Do error bars hold: random scenes of every feature of the program, on good and naive meshes, against finer solutions.
+
+    python -m benchmarks.bars [--seeds FIRST:END] [--minutes N] [--output FOLDER]
+
+A scene is drawn from the table of features (:mod:`tests.pairs`), with other numbers and proportions; its seed gives
+the same scene each time. The finer solution is the program's own with an accuracy of a tenth of the bar, on the
+meridian where there is one, else on smaller elements of degree 3. Rows go to NAME.jsonl, where a later call goes on.
+"""
+
+import copy
+import json
+import math
+import random
+import sys
+import tempfile
+import time
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import TimeoutError as Late
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from benchmarks.tables import markdown, options, write
+from epsmesh.study.read import read_mapping
+from epsmesh.study.way import Dimension
+from tests.pairs import FEATURES, Study
+from tests.same.outcome import Outcome, solve
+from tests.same.quantities import rewritten, times
+from tests.same.scenes import draw, seconds, write_files
+
+SEEDS = tomllib.loads((Path(__file__).parent / "seeds.toml").read_text(encoding="utf-8"))
+# Limits: coverage of a class of this many scenes, and of all of them.
+HELD, ALL_HELD, ENOUGH = 0.95, 0.97, 40
+# Size of elements at the edge: from a fifth of that of the base study to three times, 3/4 of the tool's half width.
+_RIM, _NAIVE = (0.15, 3.0), 1.4
+_IN_3D = 0.7  # share of round scenes solved in three dimensions, whose truth is on the meridian
+# The truth's accuracy, in bars, and its limits; its own bar may be this share of the scene's at most.
+_FINER, _ACCURACIES, _KNOWN = 10, (0.001, 0.02), 1 / 3
+_SHORT, _LONG = 8.0, 60.0  # seconds that a scene and its truth may take, as planned
+_LIMIT = 400  # seconds after which a scene is given up
+_COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A scene: its classes, the relative bar of F, and of each quantity its error, in bars, and its truth's own bar.
+
+    ``result`` is "judged", or why it is not: what became of the scene, or of its truth.
+    """
+
+    seed: int
+    result: str
+    classes: dict[str, str] = field(default_factory=dict)
+    bar: float = math.nan
+    errors: dict[str, float] = field(default_factory=dict)
+    truths: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def main(self) -> str:
+        """The quantity that the scene is about: the depth where the force is given."""
+        return "depth" if "depth" in self.errors else "force"
+
+
+def scene(seed: int, folder: Path) -> tuple[Study, dict[str, str]]:
+    """Return the study of a seed, and its classes; ``folder`` has the files of studies."""
+    dice = random.Random(f"bars {seed}")
+    drawn, names = draw(seed, folder, fine=dice.random() < 0.25)
+    slots = {feature.slot: feature.name for feature in FEATURES if feature.name in names}
+    study = _other_proportions(drawn, dice, folder)
+    mesh, naive = study["mesh"], "asked"
+    if "accuracy" not in mesh:
+        factor = math.exp(dice.uniform(*map(math.log, _RIM)))
+        naive = "naive" if factor > _NAIVE else "graded"
+        for changes in ({"rim": times(mesh["rim"], round(factor, 2)), "degree": dice.choice((1, 2, 2, 3))}, {}):
+            if "degree" in slots or (changes.get("degree") == 1 and "epsilon" not in mesh):
+                changes.pop("degree", None)
+            study["mesh"] = mesh | changes
+            if seconds(study, folder) <= _SHORT:
+                break
+        else:
+            naive = "as drawn"
+    case = next(read_mapping(study, "bars", folder).cases())
+    if case.way.dimension is Dimension.MERIDIAN and dice.random() < _IN_3D:
+        other = study | {"mesh": study["mesh"] | {"model": "3d"}}
+        if seconds(other, folder) <= _SHORT:
+            study, case = other, next(read_mapping(other, "bars", folder).cases())
+    slots["dimension"] = case.way.dimension.value
+    return study, slots | {"mesh": naive, "order": str(case.mesh.degree), "element": case.way.element}
+
+
+def _other_proportions(study: Study, dice: random.Random, folder: Path) -> Study:
+    """Return the study with each length of tool and body times a number of its own, if it remains one."""
+
+    def write(number: float, unit: str, kind: str) -> str:
+        return f"{number * (dice.uniform(0.7, 1.4) if kind == 'length' else 1):.4g} {unit}"
+
+    has_files = study["body"]["shape"] in ("cad", "surface", "image") or "file" in study["material"]["young"]
+    for parts in (("body", "probe"), ("probe",)):
+        changed = study | {part: rewritten({part: study[part]}, write)[part] for part in parts}
+        if not (has_files and "body" in parts) and seconds(changed, folder) <= _SHORT:
+            return changed
+    return study
+
+
+def truths(study: Study, bar: float) -> Iterator[Study]:
+    """Yield studies of a scene's truth, whose relative bar is ``bar``: what is tried first comes first."""
+    mesh = study["mesh"]
+    whole = mesh.get("outside", "coarse") == "coarse"
+    kept = {key: mesh[key] for key in ("epsilon", "outside") if key in mesh and not whole}
+    low, high = _ACCURACIES
+    for finer in (_FINER, _FINER / 2):
+        yield study | {"mesh": {"accuracy": f"{100 * min(max(bar / finer, low), high):.3g} %"} | kept}
+    if "rim" in mesh:
+        sizes = {key: times(mesh[key], factor) for key, factor in {"rim": 0.2, "fine": 0.5, "coarse": 0.6}.items()}
+        for degree in (3, 2):
+            yield study | {"mesh": mesh | sizes | {"growth": 0.5, "degree": degree}}
+
+
+def judged(seed: int, folder: Path) -> Row:
+    """Solve a scene and its truth, and compare."""
+    start = time.process_time()
+    study, classes = scene(seed, folder)
+    found = solve(copy.deepcopy(study), folder)
+
+    def row(result: str, *values: Any) -> Row:
+        return Row(seed, result, classes, *values, seconds=time.process_time() - start)
+
+    if not found.is_taken:
+        return row(f"{found.kind}: {' '.join(found.message.split())[:300]}")
+    name = "depth" if "force" in study["probe"] else "force"
+    bars = _relative(found, name)
+    reason = "its truth takes too long"
+    for finer in truths(study, bars):
+        if seconds(finer, folder) > _LONG:
+            continue
+        truth = solve(copy.deepcopy(finer), folder)
+        if not truth.is_taken:
+            reason = f"its truth {truth.kind}: {' '.join(truth.message.split())[:200]}"
+            continue
+        errors, known = compared(found, truth)
+        if known.get(name, math.inf) <= _KNOWN:
+            return row("judged", bars, errors, known)
+        reason = "its truth is not known well enough"
+    return row(reason, bars)
+
+
+def _relative(found: Outcome, name: str) -> float:
+    value = found.values[name]
+    with np.errstate(all="ignore"):
+        return float(np.nanmax(value.bars / np.abs(value.numbers)))
+
+
+def compared(found: Outcome, truth: Outcome) -> tuple[dict[str, float], dict[str, float]]:
+    """Return of each quantity with a bar the largest error, in bars, and the truth's own bar there."""
+    errors, known = {}, {}
+    for name, value in found.values.items():
+        other = truth.values.get(name)
+        has_bar = np.isfinite(value.bars) & (value.bars > 0)
+        if other is None or other.numbers.shape != value.numbers.shape or not has_bar.any():
+            continue
+        off = (np.abs(value.numbers - other.numbers)[has_bar] / value.bars[has_bar]).ravel()
+        worst = int(np.argmax(np.where(np.isfinite(off), off, -1)))
+        of_truth = (other.bars[has_bar] / value.bars[has_bar]).ravel()[worst]
+        if np.isfinite(off[worst]):
+            errors[name], known[name] = float(off[worst]), float(of_truth) if np.isfinite(of_truth) else math.inf
+    # Where the force is given, it is no result.
+    return {k: v for k, v in errors.items() if not ("depth" in errors and k.startswith("force"))}, known
+
+
+def table(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Return a line for all scenes, each quantity and each class: scenes, bars that hold, their interval."""
+    groups: dict[str, list[float]] = defaultdict(list)
+    for row in rows:
+        if row.result != "judged":
+            continue
+        own = row.errors[row.main]
+        groups["all"].append(own)
+        for slot, name in row.classes.items():
+            groups[f"{slot}: {name}"].append(own)
+        for name, error in row.errors.items():
+            if row.truths[name] <= _KNOWN:
+                groups[f"quantity: {name}"].append(error)
+    first = groups.pop("all", [])
+    return [_line("all", first), *(_line(name, groups[name]) for name in sorted(groups))] if first else []
+
+
+def _line(name: str, errors: list[float]) -> dict[str, Any]:
+    held = sum(error <= 1 for error in errors)
+    interval = binomtest(held, len(errors)).proportion_ci(method="wilson")
+    return {
+        "class": name, "scenes": len(errors), "held": held, "share": held / len(errors),
+        "95 %": f"{interval.low:.1%} to {interval.high:.1%}", "bar / error": 1 / max(median(errors), 1e-9),
+        "worst": max(errors),
+    }  # fmt: skip
+
+
+def report(rows: list[Row]) -> str:
+    """Return the text of the tables."""
+    lines, left = table(rows), defaultdict(list)
+    for row in rows:
+        if row.result != "judged":
+            left[row.result.split(":")[0]].append(row)
+    missed = [line["class"] for line in lines if line["share"] < (ALL_HELD if line["class"] == "all" else HELD)]
+    text = f"{len(rows)} scenes, {sum(row.seconds for row in rows):.0f} s of the processor. "
+    text += f"Not judged: {', '.join(f'{len(some)} ({reason})' for reason, some in sorted(left.items())) or 'none'}.\n"
+    few = {line["class"] for line in lines if line["scenes"] < ENOUGH}
+    text += f"Classes of {ENOUGH} scenes and more below {HELD:.0%}, or all below {ALL_HELD:.0%}: "
+    text += f"{', '.join(name for name in missed if name not in few) or 'none'}.\n\n{markdown(lines, _COLUMNS)}"
+    outside = [row for row in rows if any(e > 1 for n, e in row.errors.items() if row.truths.get(n, 1) <= _KNOWN)]
+    text += "\nOutside their bars:\n\n| seed | scene | error, in bars |\n|---|---|---|\n"
+    for row in outside:
+        off = ", ".join(f"{name} {error:.2f}" for name, error in row.errors.items() if error > 1)
+        text += f"| {row.seed} | {', '.join(row.classes.values())}; bar {row.bar:.2%} | {off} |\n"
+    return text
+
+
+def run(seeds: Iterable[int], limit: float = math.inf, told: Callable[[Row], None] = lambda row: None) -> list[Row]:
+    """Judge the scenes of some seeds, until ``limit`` (s) is over; a scene that ends its process is a row, too."""
+    end, rows = time.monotonic() + limit, []
+    with tempfile.TemporaryDirectory() as folder:
+        write_files(Path(folder))
+        pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+        for seed in seeds:
+            if time.monotonic() > end:
+                break
+            try:
+                row = pool.submit(judged, seed, Path(folder)).result(timeout=_LIMIT)
+            except (BrokenProcessPool, Late) as error:
+                row = Row(seed, f"the process ended: {type(error).__name__}")
+                for process in list(getattr(pool, "_processes", {}).values()):
+                    process.kill()
+                pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+            rows.append(row)
+            told(row)
+        pool.shutdown()
+    return rows
+
+
+def main(arguments: list[str]) -> int:
+    """Run, write, and return the exit status: 1 if bars do not hold."""
+    parser = options(__doc__)
+    first, _ = SEEDS["test"]
+    parser.add_argument("--seeds", default=f"{first}:{first + 1000}", help="FIRST:END")
+    parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time; a later call goes on")
+    asked = parser.parse_args(arguments)
+    first, end = map(int, asked.seeds.split(":"))
+    kind = next((name for name, (low, high) in SEEDS.items() if low <= first < end <= high), "sealed")
+    asked.output.mkdir(parents=True, exist_ok=True)
+    log = asked.output / f"bars-{kind}.jsonl"
+    rows = [Row(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
+    done = {row.seed for row in rows}
+    with log.open("a", encoding="utf-8") as file:
+
+        def told(row: Row) -> None:
+            print(json.dumps(asdict(row), ensure_ascii=False), file=file, flush=True)
+            print(row.seed, ", ".join(row.classes.values()), row.result, _words(row), flush=True)
+
+        rows += run((seed for seed in range(first, end) if seed not in done), 60 * asked.minutes, told)
+    rows = [row for row in rows if first <= row.seed < end]
+    text = report(rows)
+    write("bars" if kind == "test" else f"bars-{kind}", asked.output, [asdict(row) for row in rows], text)
+    print(text)
+    lines = table(rows)
+    return int(not lines or any(
+        line["share"] < HELD for line in lines if line["scenes"] >= ENOUGH or line["class"] == "all"
+    ))  # fmt: skip
+
+
+def _words(row: Row) -> str:
+    return " ".join(f"{name} {error:.2f}" for name, error in row.errors.items())
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
