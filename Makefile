@@ -142,8 +142,8 @@ vendored: setup ## fetch the JavaScript of others again, with npm, as scripts/ve
 stress: setup ## extreme values of every input (10 minutes; STRESS_ARGS="poisson layer" selects rows)
 	$(PYTHON) -m benchmarks.stress $(STRESS_ARGS)
 
-coverage: setup ## how often error bars cover the error, on 160 random scenes (COVERAGE_ARGS="--family tools --count 60 --seed 7")
-	$(PYTHON) -m benchmarks.coverage $(COVERAGE_ARGS)
+coverage: setup ## how often error bars cover the error, on 1,000 random scenes of every feature (hours; COVERAGE_ARGS="--minutes 10", then again)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.bars $(COVERAGE_ARGS)
 
 fuzz: setup ## random study files, damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)

@@ -11,6 +11,7 @@ import copy
 import json
 import math
 import random
+import resource
 import sys
 import tempfile
 import time
@@ -18,7 +19,6 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures import TimeoutError as Late
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field
 from multiprocessing import get_context
@@ -46,7 +46,7 @@ _IN_3D = 0.7  # share of round scenes solved in three dimensions, whose truth is
 # The truth's accuracy, in bars, and its limits; its own bar may be this share of the scene's at most.
 _FINER, _ACCURACIES, _KNOWN = 10, (0.001, 0.02), 1 / 3
 _SHORT, _LONG = 8.0, 60.0  # seconds that a scene and its truth may take, as planned
-_LIMIT = 400  # seconds after which a scene is given up
+_LIMIT = 150  # seconds of the processor after which a scene is given up
 _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
 
 
@@ -127,8 +127,10 @@ def truths(study: Study, bar: float) -> Iterator[Study]:
 
 
 def judged(seed: int, folder: Path) -> Row:
-    """Solve a scene and its truth, and compare."""
+    """Solve a scene and its truth, and compare; a process that needs too long is ended by the system."""
     start = time.process_time()
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(start) + _LIMIT, most))
     study, classes = scene(seed, folder)
     found = solve(copy.deepcopy(study), folder)
 
@@ -234,11 +236,9 @@ def run(seeds: Iterable[int], limit: float = math.inf, told: Callable[[Row], Non
             if time.monotonic() > end:
                 break
             try:
-                row = pool.submit(judged, seed, Path(folder)).result(timeout=_LIMIT)
-            except (BrokenProcessPool, Late) as error:
-                row = Row(seed, f"the process ended: {type(error).__name__}")
-                for process in list(getattr(pool, "_processes", {}).values()):
-                    process.kill()
+                row = pool.submit(judged, seed, Path(folder)).result()
+            except BrokenProcessPool:
+                row = Row(seed, "took too long")
                 pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
             rows.append(row)
             told(row)
