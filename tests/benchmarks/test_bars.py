@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import binomtest
 
 from benchmarks import bars
-from benchmarks.bars import HELD, Row, judged, report, scene, table, truths
+from benchmarks.bars import HELD, Row, report, scene, table, truths
 from tests.physics import hashes
 from tests.same.scenes import seconds, write_files
 
@@ -26,6 +26,7 @@ def row(error, seed=0, **classes):
     return Row(seed, "judged", {"law": "gent", **classes}, 0.02, {"force": error}, {"force": 0.1})
 
 
+@pytest.mark.nightly
 def test_a_seed_is_a_scene_and_has_a_finer_one(folder):
     assert scene(3, folder) == scene(3, folder) != scene(4, folder)
     for seed in range(3, 7):
@@ -48,6 +49,7 @@ def test_an_unknown_truth_is_not_counted():
     assert "1 (its truth takes too long)" in report([unknown, row(0.5)])
 
 
+@pytest.mark.nightly
 def test_a_scene_is_judged_and_a_campaign_goes_on(tmp_path, capsys):
     words = ["--output", str(tmp_path), "--seeds"]
     assert bars.main([*words, "2:3"]) == 0
