@@ -50,6 +50,9 @@ _LIMIT = 150  # seconds of the processor after which a scene is given up
 _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
 
 
+Values = dict[str, float]
+
+
 @dataclass(frozen=True)
 class Row:
     """A scene: its classes, the relative bar of F, and of each quantity its error, in bars, and its truth's own bar.
@@ -135,8 +138,8 @@ def judged(seed: int, folder: Path) -> Row:
     study, classes = scene(seed, folder)
     found = solve(copy.deepcopy(study), folder)
 
-    def row(result: str, *values: Any) -> Row:
-        return Row(seed, result, classes, *values, seconds=time.process_time() - start)
+    def row(result: str, bar: float = math.nan, errors: Values | None = None, known: Values | None = None) -> Row:
+        return Row(seed, result, classes, bar, errors or {}, known or {}, time.process_time() - start)
 
     if not found.is_taken:
         return row(f"{found.kind}: {' '.join(found.message.split())[:300]}")
@@ -163,7 +166,7 @@ def _relative(found: Outcome, name: str) -> float:
         return float(np.nanmax(value.bars / np.abs(value.numbers)))
 
 
-def compared(found: Outcome, truth: Outcome) -> tuple[dict[str, float], dict[str, float]]:
+def compared(found: Outcome, truth: Outcome) -> tuple[Values, Values]:
     """Return of each quantity with a bar the largest error, in bars, and the truth's own bar there."""
     errors, known = {}, {}
     for name, value in found.values.items():
