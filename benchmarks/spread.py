@@ -370,7 +370,7 @@ def main() -> None:
         path = folder / f"{number}.npz"
         if not path.exists():
             np.savez(path, **sampled(made[number], asked.samples, asked.seed + number))
-        for row in rows_of(made[number], np.load(path)):
+        for row in rows_of(made[number], np.load(path, allow_pickle=False)):
             table.add(row)
     tables = markdown(table.rows, COLUMNS), markdown([*_held(table.rows)], HELD)
     write("spread", asked.output, table.rows, "\n".join(tables))
