@@ -32,8 +32,8 @@ def _on_meridian(young, poisson=0.3, **changes):
     ("poisson", "changes"),
     [
         (0.3, {}),
-        (0.5, {"probe": SPHERE}),
-        (0.45, {"body": ELLIPSOID}),
+        pytest.param(0.5, {"probe": SPHERE}, marks=pytest.mark.nightly),
+        pytest.param(0.45, {"body": ELLIPSOID}, marks=pytest.mark.nightly),
         (0.49, {"material": LARGE, "probe": SPHERE}),
         pytest.param(0.3, {"material": LARGE}, marks=pytest.mark.nightly),
         pytest.param(0.3, {"probe": SPHERE | {"friction": 0.3}}, marks=pytest.mark.nightly),
@@ -70,7 +70,10 @@ def test_the_force_is_that_in_three_dimensions(young, poisson, changes):
 
 @pytest.mark.parametrize(
     "formula",
-    ["10 kPa*(1 + 2*max(0, 1 - r/(4 mm)))", "10 kPa*(1 + 5*max(0, 1 - sqrt(r^2 + (z + 4 mm)^2)/(1.5 mm)))"],
+    [
+        pytest.param("10 kPa*(1 + 2*max(0, 1 - r/(4 mm)))", marks=pytest.mark.nightly),
+        "10 kPa*(1 + 5*max(0, 1 - sqrt(r^2 + (z + 4 mm)^2)/(1.5 mm)))",
+    ],
 )
 def test_bars_hold_across_kinks(formula, monkeypatch):
     found = _on_meridian({"formula": formula})
