@@ -44,7 +44,8 @@ def _on_meridian(young, poisson=0.3, **changes):
 def test_a_constant_formula_is_the_modulus(poisson, changes):
     known, found, triple = (_on_meridian(y, poisson, **changes) for y in ("30 kPa", {"formula": "30 kPa"}, TRIPLE))
     assert found.force == pytest.approx(known.force, rel=1e-10)
-    assert triple.force == pytest.approx(known.force, rel=1e-8)  # relative to a third of the modulus
+    # Relative to a third of the modulus; friction settles up to a residual.
+    assert triple.force == pytest.approx(known.force, rel=1e-5 if "friction" in changes.get("probe", {}) else 1e-8)
     assert triple.force_error == pytest.approx(known.force_error, rel=0.05, abs=1e-8)
 
 
