@@ -46,7 +46,7 @@ def test_a_constant_formula_is_the_modulus(poisson, changes):
     assert found.force == pytest.approx(known.force, rel=1e-10)
     # Relative to a third of the modulus; friction settles up to a residual.
     assert triple.force == pytest.approx(known.force, rel=1e-5 if "friction" in changes.get("probe", {}) else 1e-8)
-    assert triple.force_error == pytest.approx(known.force_error, rel=0.05, abs=1e-8)
+    assert triple.force_error == pytest.approx(known.force_error, rel=0.1, abs=1e-8)
 
 
 @pytest.mark.parametrize(
