@@ -80,25 +80,25 @@ def scene(seed: int, folder: Path) -> tuple[Study, dict[str, str]]:
     drawn, names = draw(seed, folder, fine=dice.random() < 0.25)
     slots = {feature.slot: feature.name for feature in FEATURES if feature.name in names}
     study = _other_proportions(drawn, dice, folder)
-    mesh, naive = study["mesh"], "asked"
+    mesh, sizes = study["mesh"], "asked"
     if "accuracy" not in mesh:
         factor = math.exp(dice.uniform(*map(math.log, _RIM)))
-        naive = "naive" if factor > _NAIVE else "graded"
+        sizes = "naive" if factor > _NAIVE else "graded"
         for changes in ({"rim": times(mesh["rim"], round(factor, 2)), "degree": dice.choice((1, 2, 2, 3))}, {}):
-            if "degree" in slots or (changes.get("degree") == 1 and "epsilon" not in mesh):
+            if "degree" in slots:
                 changes.pop("degree", None)
             study["mesh"] = mesh | changes
             if seconds(study, folder) <= _SHORT:
                 break
         else:
-            naive = "as drawn"
+            sizes = "as drawn"
     case = next(read_mapping(study, "bars", folder).cases())
     if case.way.dimension is Dimension.MERIDIAN and dice.random() < _IN_3D:
         other = study | {"mesh": study["mesh"] | {"model": "3d"}}
         if seconds(other, folder) <= _SHORT:
             study, case = other, next(read_mapping(other, "bars", folder).cases())
     slots["dimension"] = case.way.dimension.value
-    return study, slots | {"mesh": naive, "order": str(case.mesh.degree), "element": case.way.element}
+    return study, slots | {"mesh": sizes, "order": str(case.mesh.degree), "element": case.way.element}
 
 
 def _other_proportions(study: Study, dice: random.Random, folder: Path) -> Study:
