@@ -22,7 +22,9 @@ MUTANTS_ARGS ?=
 NONE_OK = $(if $(PYTEST_ARGS),|| [ $$? -eq 5 ])
 
 # One test process per core, each with whole files, so that a file's fixtures are made once; the slowest files first.
+# One thread of BLAS in each, as in runs: idle ones spin, and would take half of the cores.
 SIDE_BY_SIDE := -n logical --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+TESTS = OMP_NUM_THREADS=1 $(PYTHON) -m pytest $(SIDE_BY_SIDE)
 # Suites that no change concerns are not run by day, unless asked for by their path.
 UNCONCERNED = $(if $(findstring tests/,$(PYTEST_ARGS)),,$$($(PYTHON) -m tests.suites))
 
@@ -67,14 +69,14 @@ docs: setup ## build the documentation; a warning is an error
 
 test: ## run the day's tests: those with the marker `mpi` on 2 ranks, the others side by side on one each
 	@scripts/setup.sh
-	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm and not nightly and not mpi" $(UNCONCERNED) $(PYTEST_ARGS) </dev/null $(NONE_OK)
+	$(TESTS) -m "not slurm and not nightly and not mpi" $(UNCONCERNED) $(PYTEST_ARGS) </dev/null $(NONE_OK)
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m "mpi and not nightly" -p no:cacheprovider \
 		$(UNCONCERNED) $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 # Only the tests of pages need a browser; without one they are skipped.
 test-all: ## run all tests, with the long ones (marker `nightly`) and all suites
 	@scripts/setup.sh chromium
-	$(PYTHON) -m pytest $(SIDE_BY_SIDE) -m "not slurm" $(PYTEST_ARGS) </dev/null
+	$(TESTS) -m "not slurm" $(PYTEST_ARGS) </dev/null
 	$(MPIRUN) 2 scripts/one-voice.sh $(PYTHON) -m mpi4py -m pytest -m mpi -p no:cacheprovider $(PYTEST_ARGS) </dev/null $(NONE_OK)
 
 test-debian13: ## run the tests on Debian 13, in a chroot (needs root)
