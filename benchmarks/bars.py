@@ -8,6 +8,7 @@ meridian where there is one, else on smaller elements of degree 3. Rows go to NA
 """
 
 import copy
+import itertools
 import json
 import math
 import random
@@ -18,10 +19,7 @@ import time
 import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -32,6 +30,7 @@ from scipy.stats import binomtest
 from benchmarks.tables import markdown, options, write
 from epsmesh.study.read import read_mapping
 from epsmesh.study.way import Dimension
+from tests.isolated import isolated
 from tests.pairs import FEATURES, Study
 from tests.same.outcome import Outcome, solve
 from tests.same.quantities import rewritten, times
@@ -235,18 +234,10 @@ def run(seeds: Iterable[int], limit: float = math.inf, told: Callable[[Row], Non
     end, rows = time.monotonic() + limit, []
     with tempfile.TemporaryDirectory() as folder:
         write_files(Path(folder))
-        pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
-        for seed in seeds:
-            if time.monotonic() > end:
-                break
-            try:
-                row = pool.submit(judged, seed, Path(folder)).result()
-            except BrokenProcessPool:
-                row = Row(seed, "took too long")
-                pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
-            rows.append(row)
-            told(row)
-        pool.shutdown()
+        timely = itertools.takewhile(lambda _: time.monotonic() < end, seeds)
+        for (seed, _), found in isolated(judged, ((seed, Path(folder)) for seed in timely)):
+            rows.append(found if isinstance(found, Row) else Row(seed, "took too long"))
+            told(rows[-1])
     return rows
 
 

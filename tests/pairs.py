@@ -16,13 +16,12 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from tests.isolated import isolated
 
 Study = dict[str, Any]
 
@@ -422,17 +421,11 @@ def run_all(folder: Path, log: Path, numbers: list[int]) -> list[Result]:
     """Run pairs, one after another in a process of their own; what kills the process is told of the pair it had."""
     results: list[Result] = []
     names = [name_of(pair) for pair in pairs()]
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
     with log.open("w", encoding="utf-8") as file:
-        for number in numbers:
-            try:
-                result = pool.submit(_run, number, str(folder)).result()
-            except BrokenProcessPool:
-                result = Result(names[number], "traceback", "the process died")
-                pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+        for (number, _), found in isolated(_run, ((number, str(folder)) for number in numbers)):
+            result = found if isinstance(found, Result) else Result(names[number], "traceback", "the process died")
             results.append(result)
             print(json.dumps(asdict(result)), file=file, flush=True)
-    pool.shutdown()
     return results
 
 

@@ -15,14 +15,11 @@ import time
 import traceback
 from collections import Counter, defaultdict
 from collections.abc import Collection, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures import TimeoutError as Late
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from epsmesh.study.toml import to_toml
+from tests.isolated import isolated
 from tests.pairs import Study
 from tests.same import changes, files, forms  # noqa: F401 (they fill the table of changes)
 from tests.same.files import write_files
@@ -184,27 +181,19 @@ def main() -> int:
     rows = [Row(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
     done = {row.seed for row in rows}
     first, end = map(int, arguments.seeds.split(":"))
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    kept = str(arguments.output / "same")
     with tempfile.TemporaryDirectory() as folder, log.open("a", encoding="utf-8") as file:
         write_files(Path(folder))
-        for seed in range(first, end):
-            if seed in done:
-                continue
-            try:
-                kept = str(arguments.output / "same")
-                found = pool.submit(_in_process, seed, folder, kept, arguments.change, arguments.fine).result(
-                    timeout=_LIMIT
-                )
-            except (BrokenProcessPool, Late) as error:
-                found = [Row(seed, (), "any", "differs", f"the process ended: {error!r}", math.inf)]
-                for process in list(getattr(pool, "_processes", {}).values()):
-                    process.kill()
-                pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
-            found = found or [Row(seed, (), "any", "none")]
-            rows += found
-            for row in found:
+        seeds = (seed for seed in range(first, end) if seed not in done)
+        items = ((seed, folder, kept, arguments.change, arguments.fine) for seed in seeds)
+        for (seed, *_), found in isolated(_in_process, items, _LIMIT):
+            if isinstance(found, Exception):
+                new = [Row(seed, (), "any", "differs", f"the process ended: {found!r}", math.inf)]
+            else:
+                new = found or [Row(seed, (), "any", "none")]
+            rows += new
+            for row in new:
                 print(json.dumps(asdict(row)), file=file, flush=True)
-    pool.shutdown()
     if not any(row.result == "differs" for row in rows):
         shutil.rmtree(arguments.output / "same", ignore_errors=True)
     text = report(rows)
