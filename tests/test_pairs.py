@@ -13,7 +13,7 @@ _EVERY = {name_of(pair): pair for pair in pairs()}
 _SLOW = {"F_exact", "surface", "image", "border", "accuracy", "relaxing regions", "relaxing round scene", "2 mm deep"}
 _QUICK = [name for name, pair in _EVERY.items() if not _SLOW & {feature.name for feature in pair}]
 _SAMPLE = random.Random(32).sample(_QUICK, 40)
-_BY_DAY = 16
+_BY_DAY = 8
 
 
 # Features that make no other case of a study, or none of one with a tool that finds its contact anyway.

@@ -258,7 +258,7 @@ def test_tilted_ball_presses_across_the_surface_as_deep_as_it_is_below_it(degree
     assert found.force_vector_error[2] == pytest.approx(found.force_error * normal, rel=1e-6)
 
 
-@pytest.mark.parametrize("degrees", [5, 17])
+@pytest.mark.parametrize("degrees", [pytest.param(5, marks=pytest.mark.nightly), 17])
 def test_tilted_ball_with_little_friction_is_the_one_without(degrees):
     depth, rim = DEPTHS[degrees]
     rubbing, smooth = tilted(degrees, depth, rim=rim, friction=1e-6), tilted(degrees, depth, rim=rim)
@@ -272,7 +272,9 @@ def test_tilt_within_the_threshold_has_a_force_along_the_axis_whose_bars_cover_t
     assert below.force == pytest.approx(above.force, rel=0.01)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3, "stick"])
+@pytest.mark.parametrize(
+    "friction", [pytest.param(0.0, marks=pytest.mark.nightly), 0.3, pytest.param("stick", marks=pytest.mark.nightly)]
+)
 def test_tilted_ball_of_a_linear_law_is_that_of_small_strains(friction):
     """A law of large displacements has the normal of the deformed surface, and the tool that drags it aside."""
     linear, large = (tilted(8, 0.1, law, friction=friction) for law in ("linear", "neo-hookean"))
@@ -307,7 +309,7 @@ def test_fixed_axis_on_a_curved_body():
     assert linear.force_vector[0] == pytest.approx(large.force_vector[0], abs=0.02 * large.force)
 
 
-@pytest.mark.parametrize("material", [{"young": "30 kPa"}, {"poisson": 0.49}])
+@pytest.mark.parametrize("material", [pytest.param({"young": "30 kPa"}, marks=pytest.mark.nightly), {"poisson": 0.49}])
 def test_force_of_a_tilted_ball_of_other_tissue(material):
     """Without the reduction it is proportional to the modulus; incompressible tissue has mixed elements."""
     found, upright = tilted(8, 0.2, material=material), tilted(0, 0.2 * cos(radians(8)), material=material)

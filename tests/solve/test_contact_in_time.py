@@ -190,7 +190,7 @@ def test_friction_on_a_quarter_is_that_of_the_whole():
 # ---- loads ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("material", [LINEAR, LARGE], ids=["linear", "large"])
+@pytest.mark.parametrize("material", [LINEAR, pytest.param(LARGE, marks=pytest.mark.nightly)], ids=["linear", "large"])
 @pytest.mark.parametrize("probe", [BALL, DISC], ids=["ball", "disc"])
 def test_under_loads_tissue_that_does_not_relax_has_the_static_force(probe, material):
     found, static = followed(HOLD, (), 3, probe=probe, material=material | HEAVY, load=GRAVITY)
@@ -200,7 +200,7 @@ def test_under_loads_tissue_that_does_not_relax_has_the_static_force(probe, mate
         assert found.load_energy == pytest.approx(static.contact.load_energy, rel=1e-9)
 
 
-@pytest.mark.parametrize("material", [LINEAR, LARGE], ids=["linear", "large"])
+@pytest.mark.parametrize("material", [pytest.param(LINEAR, marks=pytest.mark.nightly), LARGE], ids=["linear", "large"])
 @pytest.mark.parametrize("probe", [BALL, DISC], ids=["ball", "disc"])
 def test_under_loads_tissue_relaxes_to_the_softer_one_under_the_same_loads(probe, material):
     scene = {"probe": probe, "load": GRAVITY}

@@ -35,7 +35,7 @@ def test_a_force_two_bars_off_is_out(installed):
         assert not replace(row, value=float("nan")).is_right
 
 
-@pytest.mark.parametrize("rows", [load_rows, body_rows, capsule_rows])
+@pytest.mark.parametrize("rows", [load_rows, body_rows, pytest.param(capsule_rows, marks=pytest.mark.nightly)])
 def test_loads_and_bodies_have_their_closed_forms(rows):
     assert not [row for row in rows(MPI.COMM_SELF, quick=True) if not row.is_right]
 
