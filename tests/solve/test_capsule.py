@@ -131,8 +131,10 @@ def test_its_forces_and_its_tangent_are_derivatives_of_its_energy(tension):
 
 @pytest.mark.parametrize(
     ("tension", "known"),
-    [("3 N/m", 0.0335141), ("0.3 N/m", 0.0092689)],
-    ids=["taut", "wrinkled"],
+    [
+        pytest.param("3 N/m", 0.0335141, marks=pytest.mark.nightly, id="taut"),
+        pytest.param("0.3 N/m", 0.0092689, id="wrinkled"),
+    ],
 )
 def test_a_membrane_pressed_far_is_that_of_one_dimension(tension, known):
     """Below a disc as deep as it is wide; ``known`` is from the least energy of an annulus along its radius."""

@@ -35,8 +35,10 @@ def _layer(young, poisson):
         ({"probe": SPHERE}, 0.49),
         ({"probe": SPHERE | {"friction": 0.2}}, 0.3),
         ({"material": LARGE}, 0.3),
-        ({"material": LARGE, "mesh": {"epsilon": "8 mm", "outside": "linear"}}, 0.3),
-        ({"material": LARGE, "probe": SPHERE | {"friction": 0.2}}, 0.49),
+        pytest.param(
+            {"material": LARGE, "mesh": {"epsilon": "8 mm", "outside": "linear"}}, 0.3, marks=pytest.mark.nightly
+        ),
+        pytest.param({"material": LARGE, "probe": SPHERE | {"friction": 0.2}}, 0.49, marks=pytest.mark.nightly),
         pytest.param({"material": RELAXING, "probe": SPHERE | {"history": HISTORY}}, 0.49, marks=pytest.mark.nightly),
     ],
     ids=str,

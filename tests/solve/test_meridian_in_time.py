@@ -46,7 +46,7 @@ def followed(motion, *terms: Terms, steps: int = 4, **changes) -> tuple[History,
     "changes",
     [
         {"material": {"poisson": 0.3}, "body": SKIN},
-        {"material": {"poisson": 0.5}, "probe": {"contact": "frictionless"}},
+        pytest.param({"material": {"poisson": 0.5}, "probe": {"contact": "frictionless"}}, marks=pytest.mark.nightly),
     ],
 )
 def test_linear_tissue_is_the_convolution(changes):

@@ -34,7 +34,7 @@ def _on_meridian(young, poisson=0.3, **changes):
         (0.3, {}),
         pytest.param(0.5, {"probe": SPHERE}, marks=pytest.mark.nightly),
         pytest.param(0.45, {"body": ELLIPSOID}, marks=pytest.mark.nightly),
-        (0.49, {"material": LARGE, "probe": SPHERE}),
+        pytest.param(0.49, {"material": LARGE, "probe": SPHERE}, marks=pytest.mark.nightly),
         pytest.param(0.3, {"material": LARGE}, marks=pytest.mark.nightly),
         pytest.param(0.3, {"probe": SPHERE | {"friction": 0.3}}, marks=pytest.mark.nightly),
         pytest.param(0.49, {"material": RELAXING, "probe": SPHERE | {"history": HISTORY}}, marks=pytest.mark.nightly),
@@ -54,7 +54,12 @@ def test_a_constant_formula_is_the_modulus(poisson, changes):
     [
         (LUMP, 0.3, {}),
         (LUMP, 0.49, {"probe": SPHERE}),
-        ({"formula": "10 kPa*(1 + (x^2 + y^2)/(10 mm)^2 + z/(15 mm))"}, 0.45, {"body": ELLIPSOID, "probe": SPHERE}),
+        pytest.param(
+            {"formula": "10 kPa*(1 + (x^2 + y^2)/(10 mm)^2 + z/(15 mm))"},
+            0.45,
+            {"body": ELLIPSOID, "probe": SPHERE},
+            marks=pytest.mark.nightly,
+        ),
         ("5 kPa", 0.3, {"body": CYLINDER | {"layer": [SKIN]}}),
         pytest.param(LUMP, 0.3, {"material": LARGE, "probe": SPHERE}, marks=pytest.mark.nightly),
     ],
