@@ -42,7 +42,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored stress coverage pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored stress extremes coverage pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -143,6 +143,9 @@ vendored: setup ## fetch the JavaScript of others again, with npm, as scripts/ve
 
 stress: setup ## extreme values of every input (10 minutes; STRESS_ARGS="poisson layer" selects rows)
 	$(PYTHON) -m benchmarks.stress $(STRESS_ARGS)
+
+extremes: setup ## extreme values in random scenes, against finer solutions (hours; EXTREMES_ARGS="--minutes 10", then again)
+	$(MPI_ENV) $(PYTHON) -m benchmarks.extremes $(EXTREMES_ARGS)
 
 coverage: setup ## how often error bars cover the error, on 1,000 random scenes of every feature (hours; COVERAGE_ARGS="--minutes 10", then again)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.bars $(COVERAGE_ARGS)

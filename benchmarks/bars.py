@@ -50,6 +50,8 @@ _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "",
 
 
 Values = dict[str, float]
+# What draws the scene of a seed: its study, whose files are in a folder, and its classes.
+Drawn = Callable[[int, Path], tuple[Study, dict[str, str]]]
 
 
 @dataclass(frozen=True)
@@ -129,12 +131,12 @@ def truths(study: Study, bar: float) -> Iterator[Study]:
             yield study | {"mesh": mesh | sizes | {"growth": 0.5, "degree": degree}}
 
 
-def judged(seed: int, folder: Path) -> Row:
+def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
     """Solve a scene and its truth, and compare; a process that needs too long is ended by the system."""
     start = time.process_time()
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (int(start) + _LIMIT, most))
-    study, classes = scene(seed, folder)
+    study, classes = drawn(seed, folder)
     found = solve(copy.deepcopy(study), folder)
 
     def row(result: str, bar: float = math.nan, errors: Values | None = None, known: Values | None = None) -> Row:
@@ -229,21 +231,31 @@ def report(rows: list[Row]) -> str:
     return text
 
 
-def run(seeds: Iterable[int], limit: float = math.inf, told: Callable[[Row], None] = lambda row: None) -> list[Row]:
+def run(
+    seeds: Iterable[int],
+    limit: float = math.inf,
+    told: Callable[[Row], None] = lambda row: None,
+    drawn: Drawn = scene,
+) -> list[Row]:
     """Judge the scenes of some seeds, until ``limit`` (s) is over; a scene that ends its process is a row, too."""
     end, rows = time.monotonic() + limit, []
     with tempfile.TemporaryDirectory() as folder:
         write_files(Path(folder))
         timely = itertools.takewhile(lambda _: time.monotonic() < end, seeds)
-        for (seed, _), found in isolated(judged, ((seed, Path(folder)) for seed in timely)):
+        for (seed, *_), found in isolated(judged, ((seed, Path(folder), drawn) for seed in timely)):
             rows.append(found if isinstance(found, Row) else Row(seed, "took too long"))
             told(rows[-1])
     return rows
 
 
-def main(arguments: list[str]) -> int:
-    """Run, write, and return the exit status: 1 if bars do not hold."""
-    parser = options(__doc__)
+def campaign(
+    arguments: list[str], about: str | None, name: str, drawn: Drawn, told: Callable[[list[Row]], str]
+) -> list[Row]:
+    """Run the scenes that the options in ``arguments`` name, write and print what is ``told`` of them, return the rows.
+
+    The log is NAME-KIND.jsonl, where KIND says what the seeds are for; a later call goes on there.
+    """
+    parser = options(about)
     first, _ = SEEDS["test"]
     parser.add_argument("--seeds", default=f"{first}:{first + 1000}", help="FIRST:END")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time; a later call goes on")
@@ -251,21 +263,26 @@ def main(arguments: list[str]) -> int:
     first, end = map(int, asked.seeds.split(":"))
     kind = next((name for name, (low, high) in SEEDS.items() if low <= first < end <= high), "sealed")
     asked.output.mkdir(parents=True, exist_ok=True)
-    log = asked.output / f"bars-{kind}.jsonl"
+    log = asked.output / f"{name}-{kind}.jsonl"
     rows = [Row(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
     done = {row.seed for row in rows}
     with log.open("a", encoding="utf-8") as file:
 
-        def told(row: Row) -> None:
+        def note(row: Row) -> None:
             print(json.dumps(asdict(row), ensure_ascii=False), file=file, flush=True)
             print(row.seed, ", ".join(row.classes.values()), row.result, _words(row), flush=True)
 
-        rows += run((seed for seed in range(first, end) if seed not in done), 60 * asked.minutes, told)
+        rows += run((seed for seed in range(first, end) if seed not in done), 60 * asked.minutes, note, drawn)
     rows = [row for row in rows if first <= row.seed < end]
-    text = report(rows)
-    write("bars" if kind == "test" else f"bars-{kind}", asked.output, [asdict(row) for row in rows], text)
+    text = told(rows)
+    write(name if kind == "test" else f"{name}-{kind}", asked.output, [asdict(row) for row in rows], text)
     print(text)
-    lines = table(rows)
+    return rows
+
+
+def main(arguments: list[str]) -> int:
+    """Run, write, and return the exit status: 1 if bars do not hold."""
+    lines = table(campaign(arguments, __doc__, "bars", scene, report))
     return int(not lines or any(
         line["share"] < HELD for line in lines if line["scenes"] >= ENOUGH or line["class"] == "all"
     ))  # fmt: skip
