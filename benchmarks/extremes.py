@@ -84,7 +84,7 @@ def _sizes(study: Study, dice: Dice) -> None:
         if key in study["mesh"]:
             study["mesh"][key] = times(study["mesh"][key], 10 ** dice.uniform(-1, 1.3))
     if "growth" in study["mesh"]:
-        study["mesh"]["growth"] = round(dice.uniform(0.1, 3.0), 2)
+        study["mesh"]["growth"] = round(dice.uniform(0.1, 2.05), 2)
 
 
 def _scale(study: Study, dice: Dice) -> None:
