@@ -84,7 +84,10 @@ def scope_of(study: Study) -> Scope:
     Raises:
         ExportError: if the study cannot be exported.
     """
-    cases = list(study.cases())
+    scenes: dict[int, Case] = {}  # their other cases differ in what no model depends on: the mesh and the solver
+    for case in study.cases():
+        scenes.setdefault(id(case.shared), case)
+    cases = list(scenes.values())
     first = cases[0]
     for case in cases:
         if reason := _refusal(case, first):
