@@ -172,6 +172,19 @@ def _capsule(**keys: Any) -> Callable[[Study], None]:
     return change
 
 
+def _capsule_of_region(**keys: Any) -> Callable[[Study], None]:
+    """Return the change that gives the first region a capsule; without one there is an inclusion."""
+
+    def change(study: Study) -> None:
+        if not any(study["body"].get(key) for key in ("inclusion", "region")):
+            _inclusion(study)
+            study["body"]["inclusion"][0]["radius"] = "2.5 mm"
+        first = next(study["body"][key][0] for key in ("inclusion", "region") if study["body"].get(key))
+        first["capsule"] = {"young": "1 MPa", "thickness": "0.1 mm", "poisson": 0.4} | keys
+
+    return change
+
+
 def _traction(study: Study) -> None:
     study.setdefault("load", {})["traction"] = [{"on": "free", "pressure": "0.2 kPa"}]
 
@@ -261,6 +274,8 @@ FEATURES = (
     Feature("capsule", "capsule", _capsule()),
     Feature("taut capsule", "capsule", _capsule(tension_only=True)),
     Feature("stretched capsule", "capsule", _capsule(tension_only=True, tension="1 N/m")),
+    Feature("capsule of a region", "capsule of region", _capsule_of_region()),
+    Feature("taut capsule of a region", "capsule of region", _capsule_of_region(tension_only=True)),
     Feature("nu .49", "poisson", _poisson(0.49)),
     Feature("nu .5", "poisson", _poisson(0.5)),
     Feature("neo-hookean", "law", _update("material", law="neo-hookean")),

@@ -29,9 +29,9 @@ def skin(**keys):
 
 
 @contextmanager
-def on_mesh(case):
+def on_mesh(case, comm=MPI.COMM_SELF):
     """Lend the displacement and the capsule of a case, on its mesh."""
-    with Spaces(mesh_case(case, (), MPI.COMM_SELF)) as spaces:
+    with Spaces(mesh_case(case, (), comm)) as spaces:
         space = spaces.get(2, Conditions(terms=terms_of(case)))
         yield space.forms.displacement, space.terms[0]
 

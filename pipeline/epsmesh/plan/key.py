@@ -10,6 +10,8 @@ from typing import Any
 from epsmesh.plan.refinement import refinements
 from epsmesh.plan.symmetry import slides_across
 from epsmesh.shapes.body import PIECES, Body
+from epsmesh.shapes.capsule import Capsule
+from epsmesh.shapes.part import Around
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
@@ -74,7 +76,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
         _ratios_text(case.probe) if scaled else "",
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
-    tail += [f"capsule {text_of(case.body.capsule)}"] if case.body.capsule else []
+    tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
@@ -219,6 +221,10 @@ def _tissue_content(tissue: Tissue) -> dict[str, Any]:
 
 def _tissue_text(tissue: Tissue) -> str:
     return _text(_tissue_content(tissue))
+
+
+def _capsule_text(capsule: Capsule) -> str:
+    return text_of(capsule, ("on",) if isinstance(capsule.on, Around) else ())
 
 
 def _time_text(case: Case) -> str:

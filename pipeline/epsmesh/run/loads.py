@@ -6,7 +6,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.frame import Frame, Vector
-from epsmesh.shapes.part import FREE, Cap
+from epsmesh.shapes.part import FREE, Around, Cap
 from epsmesh.shapes.surface import Surface
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.solve.movement import Loads, SurfaceLoad
@@ -45,6 +45,10 @@ def terms_of(case: Case) -> tuple[AddedTerm, ...]:
 
     def of(term: BodyTerm) -> AddedTerm:
         key = term, None if turn is None else turn.tobytes()  # spaces are those of one mesh, hence of one body
+        if isinstance(term.on, Around) and term.on not in case.body.cavities:
+            number = case.body.region_names.index(term.on)
+            numbers = number, number + len(case.tissues)  # the second of its linear part
+            return EnergyTerm(term.energy, key, turn=turn, around=numbers)
         return EnergyTerm(term.energy, key, *_part(case, term.on), turn)
 
     return tuple(map(of, case.terms))

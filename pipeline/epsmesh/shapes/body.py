@@ -11,7 +11,7 @@ from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.frame import Frame, Units, Vector
 from epsmesh.shapes.half_plane import HalfPlane
-from epsmesh.shapes.part import is_part_mirrored
+from epsmesh.shapes.part import Around, is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Region
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
@@ -71,8 +71,28 @@ class Body(Section, ABC):
     ] = "none"
 
     def is_capsule_mirrored(self, normal: Vector) -> bool:
-        """Tell whether the capsule, if any, is its own image in a plane with that unit normal, as the shape is."""
+        """Tell whether the capsule, if any, is its own image in a plane with that unit normal, as the shape is.
+
+        Those of regions are, as the regions themselves.
+        """
         return self.capsule is None or is_part_mirrored(self.capsule.on, normal)
+
+    @property
+    def capsules(self) -> dict[str, Capsule]:
+        """Its capsule, and those of its regions, by their places in a study, such as inclusion[2].capsule."""
+        regions = zip(self.places, self.regions, strict=True)
+        own = {"capsule": self.capsule} if self.capsule else {}
+        return own | {
+            f"{place}.capsule": piece.capsule.around(piece.name)
+            for place, piece in regions
+            if isinstance(piece, Embedded) and piece.capsule
+        }
+
+    @property
+    def skins(self) -> tuple[Capsule, ...]:
+        """The capsules that a tool may touch: its own, and those of regions that may meet its surface."""
+        inner = {piece.name for piece in self.embedded} - {piece.name for piece in self.meeting}
+        return tuple(one for one in self.capsules.values() if not (isinstance(one.on, Around) and one.on in inner))
 
     @property
     def pieces(self) -> dict[str, tuple[Region, ...]]:

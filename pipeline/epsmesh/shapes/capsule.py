@@ -1,9 +1,10 @@
-"""A capsule: a thin elastic skin on a body, such as the liver's, as a membrane without elements of its own."""
+"""A capsule: a thin elastic skin of a body, such as the liver's, or of a region, as a membrane without elements."""
 
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from epsmesh.shapes.part import Around
 from epsmesh.shapes.section import Words
 from epsmesh.shapes.term import BodyTerm, Place
 from epsmesh.units import Length, Pressure, Tension
@@ -15,7 +16,7 @@ _SAME = 1e-12
 
 
 class Capsule(BodyTerm):
-    """A membrane: isotropic, in plane stress, without bending stiffness, and as the facets of the body deform.
+    """A membrane: isotropic, in plane stress, without bending stiffness, and as facets of the body's elements deform.
 
     Its energy is that of small strains along the surface, or, of ``tension_only``, that of Green's strain
     (Saint Venant and Kirchhoff), relaxed: a membrane without bending stiffness wrinkles where it would be compressed,
@@ -52,6 +53,10 @@ class Capsule(BodyTerm):
         bool,
         Words("Whether it wrinkles where it would be compressed, at any rotation of the surface.", "true"),
     ] = False
+
+    def around(self, region: str) -> "Capsule":
+        """Return this capsule on the whole surface of a ``region``."""
+        return self.model_copy(update={"on": Around(region)})
 
     def energy(self, at: Place) -> Any:
         """Return the energy (J) of the membrane, and of its tension."""

@@ -42,6 +42,12 @@ def _on(value: Any) -> Any:
 Part = Annotated[str | Cap, BeforeValidator(_on)]
 
 
+class Around(str):
+    """The whole surface of a region of a body, by its name: where it meets other tissue, and the body's boundary."""
+
+    __slots__ = ()
+
+
 def is_part_mirrored(part: str | Cap, normal: Vector) -> bool:
     """Tell whether a part is its own image in the plane through the origin with that unit normal, as the body is.
 

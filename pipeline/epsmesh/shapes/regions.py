@@ -2,6 +2,9 @@
 
 from typing import Annotated
 
+from pydantic import Field
+
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.section import Name, Words
@@ -37,6 +40,16 @@ class Layer(Region):
 
 class Embedded(Region):
     """A region wholly inside the body, bounded by a closed surface."""
+
+    capsule: Annotated[
+        Capsule | None,
+        Field(exclude=True),
+        Words(
+            "Capsule: a membrane on the whole surface of the region, with the keys of [body.capsule] but `on`.",
+            '{young = "1 MPa", thickness = "0.2 mm"}',
+            default="none",
+        ),
+    ] = None
 
     @property
     def surface(self) -> Closed:

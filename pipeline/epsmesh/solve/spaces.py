@@ -150,7 +150,7 @@ class ElasticSpace:
         for term in terms:
             if not whole:
                 term.zeroRowsColumns(rows.astype(PETSc.IntType), diag=0.0)
-            matrix.axpy(1.0, term, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            matrix.axpy(1.0, term, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
 
     @stage("assembly")
     def _assemble(self, law: MaterialLaw, *, whole: bool) -> PETSc.Mat:

@@ -16,7 +16,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from epsmesh import compat
-from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import FREE, PROBE
 from epsmesh.solve import SolveError
@@ -29,6 +29,8 @@ from epsmesh.solve.measures import dx, has_curved_cells
 _FREE = 1e-9
 # Quadrature degrees that the map of a curved facet adds.
 _CURVED = 3
+# Cells beside a facet within the body.
+_SIDES = 2
 # Marks of facets, and the quadrature degree of those that the edge of a cap crosses.
 _WHOLE, _CROSSED, _OF_CROSSED = 1, 2, 20
 # Tells which facets a term acts on, from their corners (n, 3, 3) and outward unit normals (n, 3), in m.
@@ -50,7 +52,7 @@ class Term(Protocol):
     def operator(self, into: PETSc.Mat | None = None) -> PETSc.Mat | None:
         """Return its second derivative (N/m), without conditions, ``into`` an earlier one; None if it is always zero.
 
-        It couples dofs of the same cell only.
+        It couples dofs of the same cell only; between those of two cells it may have zeros.
         """
 
 
@@ -66,7 +68,7 @@ class Place:
     """What the energy of a term is written in: the displacement ``u`` (m) on the mesh of a ``body``.
 
     The term acts ``on`` facets of the boundary, None for all of it, ``within`` a ball by its centre (m) and radius (m),
-    None for no bound. ``turn`` rotates the body to the mesh.
+    None for no bound; or ``around`` the cells of regions, by their numbers. ``turn`` rotates the body to the mesh.
     """
 
     body: BodyMesh
@@ -74,6 +76,7 @@ class Place:
     on: OnFacets | None = None
     within: Ball | None = None
     turn: FloatArray | None = None
+    around: tuple[int, ...] = ()
     ufl = ufl
 
     @property
@@ -98,17 +101,21 @@ class Place:
 
     @cached_property
     def ds(self) -> Any:
-        """The measure of the undeformed boundary (m²) on which the term acts, the support excepted."""
+        """The measure of the undeformed boundary (m²) on which the term acts, the support excepted.
+
+        ``around`` regions it has their borders with other tissue, too: there, on either side, values are the same but
+        for the gradient across.
+        """
         boundary = boundary_of(self.body, (FREE, PROBE))
+        if self.around:
+            return self._around(boundary)
         every = np.ones(len(boundary.facets), dtype=bool)
         chosen = every if self.on is None else self.on(boundary.corners, boundary.normals)
         halvings = halvings_at_end(self.within, boundary.corners)
-        degree = 2 * compat.degree(self.u.function_space) + MORE + (_CURVED if has_curved_cells(self.body.mesh) else 0)
         chosen &= halvings >= 0
         values = np.where(halvings == 0, _WHOLE, _CROSSED)[chosen]
-        tags = compat.facet_tags(self.body.mesh, boundary.facets[chosen], values)
-        measure = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=tags)
-        whole = measure(_WHOLE, metadata={"quadrature_degree": degree})
+        measure = self._measure("ds", boundary.facets[chosen], values)
+        whole = measure(_WHOLE, metadata={"quadrature_degree": self._degree})
         if self.within is None:
             return whole
         centre, radius = self.within
@@ -117,6 +124,35 @@ class Place:
         crossed = measure(_CROSSED, metadata={"quadrature_degree": _OF_CROSSED})
         is_crossed = chosen & (halvings > 0)
         return Clipped(whole, crossed, inside * self._share(boundary, is_crossed, inside, crossed))
+
+    @property
+    def _degree(self) -> int:
+        """The quadrature degree on facets that no cap's edge crosses."""
+        curved = _CURVED if has_curved_cells(self.body.mesh) else 0
+        return 2 * compat.degree(self.u.function_space) + MORE + curved
+
+    def _measure(self, kind: str, facets: Int32Array, values: IntArray) -> Any:
+        tags = compat.facet_tags(self.body.mesh, facets, values)
+        return ufl.Measure(kind, domain=self.body.mesh, subdomain_data=tags)
+
+    def _around(self, boundary: Boundary) -> "Bordered":
+        """Return the measure of the surface of regions; collective."""
+        topology, degree = self.body.mesh.topology, self._degree
+        assert self.body.regions is not None
+        facets = topology.connectivity(topology.dim, topology.dim - 1).array.reshape(len(self.body.regions), -1)
+        is_within = np.isin(self.body.regions, self.around)
+        count = topology.index_map(topology.dim - 1)
+        beside, within = (
+            np.bincount(some.reshape(-1), minlength=count.size_local + count.num_ghosts)
+            for some in (facets, facets[is_within])
+        )
+        borders = np.flatnonzero((beside == _SIDES) & (within == 1)).astype(np.int32)
+        outer = boundary.facets[is_within[boundary.cells]]
+        of_borders, of_boundary = (
+            self._measure(kind, found, np.full(len(found), _WHOLE))(_WHOLE, metadata={"quadrature_degree": degree})
+            for kind, found in (("dS", borders), ("ds", outer))
+        )
+        return Bordered(of_borders, of_boundary if self.body.comm.allreduce(len(outer)) else None)
 
     def _share(self, boundary: Boundary, crossed: BoolArray, inside: Any, measure: Any) -> Any:
         """Return the true area of ``crossed`` facets in the ball, by cells, in units of that of ``inside`` on them.
@@ -159,11 +195,23 @@ class Clipped:
 
 
 @dataclass(frozen=True)
+class Bordered:
+    """A measure of facets between tissues, ``borders``, and of those on the ``boundary``, None if there are none."""
+
+    borders: Any
+    boundary: Any
+
+    def __rmul__(self, integrand: Any) -> Any:
+        between = integrand("+") * self.borders
+        return between if self.boundary is None else between + integrand * self.boundary
+
+
+@dataclass(frozen=True)
 class EnergyTerm:
     """A term by its ``energy`` (J), a form of UFL at a :class:`Place`; its derivatives follow.
 
-    It acts ``on_facets`` of the boundary, None for all, ``within`` a ball, None for no bound. Terms of equal ``key``
-    are equal: their spaces are shared.
+    It acts ``on_facets`` of the boundary, None for all, ``within`` a ball, None for no bound; or ``around`` regions by
+    their numbers. Terms of equal ``key`` are equal: their spaces are shared.
     """
 
     energy: Callable[[Any], Any] = field(compare=False)
@@ -171,10 +219,12 @@ class EnergyTerm:
     on_facets: OnFacets | None = field(default=None, compare=False)
     within: Ball | None = field(default=None, compare=False)
     turn: FloatArray | None = field(default=None, compare=False)
+    around: tuple[int, ...] = field(default=(), compare=False)
 
     def on(self, body: BodyMesh, displacement: Any) -> Term:
         """Return the term on the space of the function ``displacement``; collective."""
-        return _OfForm(self.energy(Place(body, displacement, self.on_facets, self.within, self.turn)), displacement)
+        place = Place(body, displacement, self.on_facets, self.within, self.turn, self.around)
+        return _OfForm(self.energy(place), displacement)
 
 
 class _OfForm:

@@ -91,7 +91,7 @@ class Case:
 
     @property
     def terms(self) -> tuple[BodyTerm, ...]:
-        """What else has an energy: terms of [load], and the body's capsule."""
+        """What else has an energy: terms of [load], and capsules."""
         return terms_of(self)
 
     @property
@@ -263,7 +263,7 @@ class Case:
         """
         if not self.probe.has_singular_edge:
             return True
-        if self.body.capsule is not None and self.body.capsule.tension_only:
+        if any(capsule.tension_only for capsule in self.body.skins):
             return False
         return not self.way.is_large or self.probe.depth <= _SHALLOW * self.probe.half_width
 

@@ -10,6 +10,7 @@ from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.regions import Embedded
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.support import NONE, Faces, NamedFace
@@ -33,9 +34,8 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         if axis.section == "load" and axis.piece and not axis.owner:
             problems.error(axis.path, None, "is swept: give its table a `name`")
     for body in bodies:
-        if body.capsule:
-            with problems.about(body=body):
-                _check_place(body, body.capsule.on, "body.capsule.on", problems)
+        with problems.about(body=body):
+            _check_capsules(body, problems)
     problems.each(lambda body, _: _check_imaged(body, loads, problems), body=bodies)
     for body, load in product(bodies, loads):
         if body.fixed == NONE and not any(term.HOLDS for term in load.terms):
@@ -53,6 +53,19 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         for number, traction in enumerate(load.traction, start=1):
             with problems.about(body=body):
                 _check_traction(body, probes, traction, f"load.traction[{number}].on", problems)
+
+
+def _check_capsules(body: Body, problems: Problems) -> None:
+    """Check where capsules are: that of the body on its outer surface, those of regions on all of theirs."""
+    key = "body.capsule.on"
+    if body.capsule and body.capsule.on in body.cavities:
+        problems.error(key, body.capsule.on, "is a hollow region: give that region a `capsule` of its own")
+    elif body.capsule:
+        _check_place(body, body.capsule.on, key, problems)
+    for place, piece in zip(body.places, body.regions, strict=True):
+        if isinstance(piece, Embedded) and piece.capsule and "on" in piece.capsule.model_fields_set:
+            where = "is for [body.capsule]: that of a region is on all of its surface. Omit it"
+            problems.error(f"body.{place}.capsule.on", None, where)
 
 
 def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None:

@@ -42,7 +42,7 @@ _TEXTS = {
     "labels of the body's image. A region is inside the body. It must not touch the surface, inclusions, ends of "
     "layers, or other regions; labels may touch each other and the surface. Optional; every value can be swept.",
     "body.capsule": "Capsule: a thin elastic membrane on the body's surface, which bears tension along it and does not "
-    "bend. Optional; every value can be swept.",
+    "bend; that of a region is [body.inclusion.capsule] or [body.region.capsule]. Optional; every value can be swept.",
     "material": "Material of all tissue outside layers, inclusions and regions: isotropic, and elastic or "
     "relaxing. Omit it if layers fill the body.",
     "material.relaxation": "Relaxation over time: terms of a Prony series, one table each. `young` is then the "

@@ -10,6 +10,7 @@ from math import inf, isfinite
 from typing import Any, Protocol
 
 from epsmesh.shapes.body import Body, Layered
+from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.contact import is_flat, is_inclined, is_level
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.insertion import Inserted
@@ -156,20 +157,18 @@ def _is_imaged(scene: Scene) -> bool:
 
 
 def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
-    """Return the terms of the energy besides the law's: those of [load], and the body's capsule."""
-    return (*scene.load.terms, *filter(None, [scene.body.capsule]))
+    """Return the terms of the energy besides the law's: those of [load], and capsules."""
+    return (*scene.load.terms, *scene.body.capsules.values())
 
 
-def _has_tension(scene: Scene) -> bool:
-    return scene.body.capsule is not None and scene.body.capsule.tension > 0
+def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_: True, **how: Any) -> Feature:
+    """Return the feature that a capsule, of the body or a region of it, has by its ``key``."""
 
+    def first(scene: Scene) -> tuple[str, Any] | None:
+        found = (place for place, one in scene.body.capsules.items() if has(one, scene.body))
+        return next(((f"body.{place}{key}", None) for place in found), None)
 
-def _is_compressed(scene: Scene) -> bool:
-    return scene.body.capsule is not None and not scene.body.capsule.tension_only
-
-
-def _wrinkles(scene: Scene) -> bool:
-    return scene.body.capsule is not None and scene.body.capsule.tension_only
+    return Feature(f"body.capsule{key}", lambda scene: first(scene) is not None, where=first, **how)
 
 
 def _moves_surface(scene: Scene) -> bool:
@@ -286,10 +285,14 @@ FEATURES: dict[str, Feature] = {
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
     "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
-    "capsule": Feature("body.capsule", lambda s: s.body.capsule is not None, write=lambda _: None),
-    "capsule that bears compression": Feature("body.capsule.tension_only", _is_compressed, write=lambda _: False),
-    "capsule that wrinkles": Feature("body.capsule.tension_only", _wrinkles, write=lambda _: True),
-    "tension of the capsule": Feature("body.capsule", _has_tension, write=lambda _: None),
+    "capsule": _of_capsule(),
+    "capsule that bears compression": _of_capsule(
+        ".tension_only", lambda one, _: not one.tension_only, write=lambda _: False
+    ),
+    "capsule that wrinkles under the tool": _of_capsule(
+        ".tension_only", lambda one, body: one.tension_only and one in body.skins, write=lambda _: True
+    ),
+    "tension of the capsule": _of_capsule("", lambda one, _: one.tension > 0),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.
     "outputs": Feature("output", lambda s: bool(getattr(s, "outputs", ()))),

@@ -193,7 +193,7 @@ REFUSALS: tuple[Refusal, ...] = (
     # The shape without load.
     Refusal("unloaded shape", "linear law", "does not change F at small displacements: omit it, or give another law"),
     Refusal("unloaded shape", "terms", f"is not computed {_WITH_TERMS}: {_NO_TERMS}"),
-    Refusal("unloaded shape", "time steps", f"tissue that creeps has no shape without load: {_STATIC}"),
+    Refusal("unloaded shape", "time steps", f"{_IN_STEPS}, which start from the given shape: {_STATIC}"),
     # Relaxation, and histories of the depth.
     Refusal(
         "static relaxing tissue",
@@ -250,7 +250,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         "friction that slides",
-        "capsule that wrinkles",
+        "capsule that wrinkles under the tool",
         'does not settle on a capsule that wrinkles under it: omit it, or use friction = "stick"',
     ),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
