@@ -128,7 +128,7 @@ def test_tissue_too_tough_for_the_depth_that_load_steps_reached_names_a_toughnes
     assert known["depth_reached"].item() == pytest.approx(end, rel=1e-3)
     assert known["force_reached"].item() == pytest.approx(STIFFNESS * end**2, rel=1e-3)
     assert short.message.startswith("1.02 mm: the tissue folds before it is pierced: too tough")
-    (toughness,) = re.findall(r"about (\S+) J/m\^2 would be pierced \(here 5 J", short.message)
+    (toughness,) = re.findall(r"about (\S+) J/m² would be pierced \(here 5 J", short.message)
     assert 0.5 < float(toughness) < 5
     weaker = path_of(scene(toughness=f"{toughness} J/m^2"), fails=fails, reached=1.03e-3)
     assert weaker.status == OK and weaker.punctures[0] and weaker.reached is None

@@ -188,8 +188,8 @@ class NeedleScene(InsertionScene[Needle]):
         toughness = self.layers[number].toughness
         return (
             f"{1e3 * depth:.3g} mm: the tissue folds before it is pierced: too tough for this law and tool. It stores "
-            f"{1e3 * has:.3g} mJ, and a cut takes {1e3 * takes:.3g} mJ. Tissue of about {share * toughness:.2g} J/m^2 "
-            f"would be pierced (here {toughness:.4g} J/m^2), or by a tool {1 / share:.2g} times as wide. With a law "
+            f"{1e3 * has:.3g} mJ, and a cut takes {1e3 * takes:.3g} mJ. Tissue of about {share * toughness:.2g} J/m² "
+            f"would be pierced (here {toughness:.4g} J/m²), or by a tool {1 / share:.2g} times as wide. With a law "
             "that stiffens more (Ogden: a larger alpha) the tool can be pressed deeper"
         )
 
