@@ -76,6 +76,7 @@ _KINDS = {
     "rad": _Kind("an angle", "60 deg", {"deg": pi / 180, "°": pi / 180, "rad": 1.0}),
     "kg/m^3": _Kind("a density", "1060 kg/m^3", {"kg/m^3": 1.0, "g/cm^3": 1e3}),
     "m/s^2": _Kind("an acceleration", "-9.81 m/s^2", {"m/s^2": 1.0, "mm/s^2": 1e-3}),
+    "m/s": _Kind("a speed", "5 mm/s", {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "mm/min": 1e-3 / 60, "µm/s": 1e-6}),
     "N": _Kind("a force", "10 mN", {"N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}),
     "N/m": _Kind("a stiffness", "60 N/mm", {"N/m": 1.0, "N/mm": 1e3, "mN/mm": 1.0, "N/µm": 1e6}),
     "N/m^3": _Kind(
@@ -238,6 +239,7 @@ Stiffness = Annotated[float, _quantity_in("N/m"), Field(gt=0, json_schema_extra=
 Tension = Annotated[float, _quantity_in("N/m"), Field(ge=0, json_schema_extra={"unit": "N/m"})]
 Foundation = Annotated[float, _quantity_in("N/m^3"), Field(gt=0, json_schema_extra={"unit": "N/m^3"})]
 Acceleration = Annotated[float, _quantity_in("m/s^2"), Field(json_schema_extra={"unit": "m/s^2"})]
+Speed = Annotated[float, _quantity_in("m/s"), Field(gt=0, json_schema_extra={"unit": "m/s"})]
 Duration = Annotated[float, _quantity_in("s"), Field(ge=0, json_schema_extra={"unit": "s"})]
 Time = Annotated[float, _quantity_in("s"), Field(gt=0, json_schema_extra={"unit": "s"})]
 Frequency = Annotated[float, _quantity_in("Hz"), Field(gt=0, json_schema_extra={"unit": "Hz"})]

@@ -38,6 +38,7 @@ _QUANTITIES = {
     "Hz": ("frequency", "frequencies"),
     "kg/m^3": ("density", "densities"),
     "m/s^2": ("acceleration", "accelerations"),
+    "m/s": ("speed", "speeds"),
     "N": ("force", "forces"),
     "N/m": ("stiffness", "stiffnesses"),
     "N/m^3": ("stiffness per area", "stiffnesses per area"),

@@ -71,6 +71,8 @@ _TEXTS = {
     "named traction can be swept.",
     "plan": "Work that may be skipped. Optional; its lists are no sweeps.",
     "figure": "Main figure of the study. Forces do not depend on it. Optional; its lists are no sweeps.",
+    "credibility": "What the answer is for, on the page of `epsmesh report --credibility`. Forces do not depend on it. "
+    "Optional; its lists are no sweeps.",
     "output": "Further numbers of each case, one table each: variables of the dataset with error bars, at a point, "
     "over a region, or of a function of your own. Forces do not depend on them. Optional; their lists are no sweeps.",
 }

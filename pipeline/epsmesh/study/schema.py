@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
 from epsmesh import extensions
@@ -24,8 +24,9 @@ from epsmesh.shapes.varying import Varying
 from epsmesh.study.loads import Load, Traction
 from epsmesh.study.output import Output
 from epsmesh.study.path import Path
+from epsmesh.study.text import one_line
 from epsmesh.study.vocabulary import FIGURES, REDUCTIONS
-from epsmesh.units import Length, Pressure, Share, parse_quantity
+from epsmesh.units import Length, Pressure, Share, Speed, parse_quantity
 
 # ---- material ---------------------------------------------------------------------------------------
 
@@ -317,6 +318,52 @@ class Drawing(Section):
     ] = False
 
 
+# Characters of an answer, of which a page has several.
+_LONGEST = 500
+
+
+def _sentences(text: str) -> str:
+    if not 0 < len(text.strip()) <= _LONGEST:
+        raise PydanticCustomError("not_supported", f"must have 1 to {_LONGEST} characters")
+    return one_line(text)
+
+
+_Line = Annotated[str, AfterValidator(_sentences)]
+_Level = Literal["low", "medium", "high"]
+
+
+class Credibility(Section):
+    """What the answer of a study is for, in the words of ASME V&V 40. Forces do not depend on it."""
+
+    question: Annotated[
+        _Line | None,
+        Words("Question of interest: what is to be decided.", '"Is 20 mN enough to pierce skin?"', default="none"),
+    ] = None
+    context_of_use: Annotated[
+        _Line | None,
+        Words(
+            "Context of use: what the model does for the question, and which other evidence there is.",
+            '"F decides which of two needles is tried on phantoms first."',
+            default="none",
+        ),
+    ] = None
+    decision_consequence: Annotated[
+        _Level | None, Words("Harm that a wrong decision would do.", '"low"', default="none")
+    ] = None
+    model_influence: Annotated[
+        _Level | None, Words("Weight of the model among all evidence for the decision.", '"medium"', default="none")
+    ] = None
+    speed: Annotated[
+        Speed | None,
+        Field(json_schema_extra={"unit": "m/s"}),
+        Words(
+            "Largest speed of the tool. The page compares inertia, which is not computed, with stiffness.",
+            '"5 mm/s"',
+            default="that of [probe.history]; none without it",
+        ),
+    ] = None
+
+
 SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "body": BODIES,
     "material": Material,
@@ -326,6 +373,7 @@ SECTIONS: dict[str, type[Section] | Mapping[str, type[Section]]] = {
     "plan": Planning,
     "load": Load,
     "figure": Drawing,
+    "credibility": Credibility,
 }
 # Sections on which no force depends: further numbers of a solution. Other packages add some: see further().
 FURTHER: dict[str, type[Section]] = {"output": Output}
@@ -338,7 +386,7 @@ NESTED: dict[str, dict[str, type[Section]]] = {
     "load": {"traction": Traction, **TERMS},
 }
 # Sections that say how, not what: their lists are no sweeps.
-SINGLE = ("solve", "plan", "figure")
+SINGLE = ("solve", "plan", "figure", "credibility")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
     "body": {"capsule": Capsule},

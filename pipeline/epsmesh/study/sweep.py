@@ -20,7 +20,7 @@ from epsmesh.study.insertion_stages import punctures
 from epsmesh.study.loads import Load
 from epsmesh.study.output import Output
 from epsmesh.study.problems import Problem
-from epsmesh.study.schema import Drawing, Material, Mesh, Planning, Solving, main_material
+from epsmesh.study.schema import Credibility, Drawing, Material, Mesh, Planning, Solving, main_material
 
 Value = TypeVar("Value")
 
@@ -129,6 +129,13 @@ class Study:
         (drawing,) = self.sections["figure"]
         assert isinstance(drawing, Drawing)
         return drawing
+
+    @cached_property
+    def credibility(self) -> Credibility:
+        """The section on what the answer is for, which is not swept."""
+        (found,) = self.sections["credibility"]
+        assert isinstance(found, Credibility)
+        return found
 
     def indices(self) -> Iterator[tuple[int, ...]]:
         """Yield the index of every case, one number for each axis, the last axis fastest."""

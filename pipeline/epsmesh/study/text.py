@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import PydanticCustomError
+
 from epsmesh.shapes.files.foreign import why_no_study
 from epsmesh.study.problems import Problem, Problems, StudyError
 from epsmesh.study.syntax import meant
@@ -21,6 +23,7 @@ _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+
 LARGEST = 2**63
 # Control characters and what turns the direction of writing: on a terminal they make a line say something else.
 _NO_STUDY = "is no study: a study file is TOML, and ends in .toml"
+_OF_LINE = "must be one line of text without control characters"
 _CONTROLS = ("Cc", "Cs", "Zl", "Zp")
 _TURNS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
@@ -90,8 +93,23 @@ def _refused(file: str, what: str, why: str) -> StudyError:
 
 def check_text(key: str, text: str, problems: Problems) -> None:
     """Report a text that is not safe to print: one with several lines, control characters, or a reversed direction."""
-    if any(unicodedata.category(letter) in _CONTROLS or letter in _TURNS for letter in text):
-        problems.error(key, text, "must be one line of text without control characters")
+    if not _is_line(text):
+        problems.error(key, text, _OF_LINE)
+
+
+def one_line(text: str) -> str:
+    """Return a text that is safe to print, for a key of a section.
+
+    Raises:
+        PydanticCustomError: if it is not.
+    """
+    if not _is_line(text):
+        raise PydanticCustomError("not_supported", _OF_LINE)
+    return text
+
+
+def _is_line(text: str) -> bool:
+    return not any(unicodedata.category(letter) in _CONTROLS or letter in _TURNS for letter in text)
 
 
 def _inside(layer: list[Any]) -> Iterator[Any]:

@@ -87,7 +87,9 @@ def in_order(study: Study, order: Sequence[Parameter], values: Any) -> FloatArra
 
 def _elastic(raw: Mapping[str, Any]) -> dict[str, Any]:
     """Return a study without what the elastic force does not depend on."""
-    found = {name: section for name, section in raw.items() if name in SECTIONS and name != "figure"}
+    found = {
+        name: section for name, section in raw.items() if name in SECTIONS and name not in ("figure", "credibility")
+    }
     for section, key in (("probe", "history"), ("material", "relaxation")):
         if isinstance(table := found.get(section), dict):
             found[section] = {name: value for name, value in table.items() if name != key}
