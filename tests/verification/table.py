@@ -31,12 +31,22 @@ _OF_SCENES = (
 )  # fmt: skip
 
 
+def groups(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Iterator[Row]]:
+    """Yield the comparisons of each kind; ``quick`` yields a few of each; collective."""
+    yield _elements(comm)
+    for of_scenes in _OF_SCENES:
+        yield of_scenes(comm, quick=quick)
+
+
 def rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the comparisons one by one, the same on every rank; ``quick`` yields a few of each kind; collective."""
+    for group in groups(comm, quick=quick):
+        yield from group
+
+
+def _elements(comm: MPI.Comm) -> Iterator[Row]:
     checked: list[Row] = []
     if comm.rank == 0:
         with compiling():
             checked = list(element_rows())
     yield from comm.bcast(checked)
-    for of_scenes in _OF_SCENES:
-        yield from of_scenes(comm, quick=quick)

@@ -7,7 +7,7 @@ import typer
 
 from epsmesh.cli.cases import find_case
 from epsmesh.cli.console import say
-from epsmesh.cli.faults import Fault, fail, of_file, of_option
+from epsmesh.cli.faults import Fault, fail, of_file, of_option, refusing
 from epsmesh.cli.words import (
     DEFAULT_MESHES,
     DEFAULT_OUTPUT,
@@ -63,6 +63,14 @@ def report(
             help="With --figures: also draw the scenes that figures of a large study leave out: <study>_<kind>_2.png …",
         ),
     ] = False,
+    credibility: Annotated[
+        bool,
+        typer.Option(
+            "--credibility",
+            help="Write the page of credibility instead, <study>_credibility.html: context of use, verification, "
+            "uncertainty, measurements and limits, and what is not known of each.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Write the report of a dataset beside it, or of an identification: one HTML page, <study>.html.
@@ -75,12 +83,19 @@ def report(
     Example: epsmesh report results/figure3.nc --scene "epsilon=10 mm"
 
     Example: epsmesh report studies/figure3.toml --figures --kind error --kind force
+
+    Example: epsmesh report results/figure3.nc --credibility
     """
     from epsmesh.report.read import other_kind
 
     if not figures and (kind or rest):
         fail("--kind and --all say which figures are drawn: give --figures, too")
-    path, dataset = read_dataset(file, output, any_kind=True)
+    if credibility and (figures or scene):
+        fail("--credibility writes a page of its own: omit --figures and --scene")
+    path, dataset = read_dataset(file, output, any_kind=not credibility)
+    if credibility:
+        _write_credibility(path, dataset)
+        return
     if other := other_kind(dataset):
         _write_other(path, dataset, other, figures=figures)
         return
@@ -95,6 +110,17 @@ def report(
 
     shown = "" if wanted == _NONE else _scene_of(path, dataset, wanted) if wanted else _scene_at_hand(dataset)
     page = write_page(dataset, path.with_suffix(".html"), shown)
+    say({"file": str(path), "page": str(page)}, str(page))
+
+
+def _write_credibility(path: Path, dataset: "xr.Dataset") -> None:
+    """Write the page of credibility of a study's dataset beside it."""
+    from epsmesh.report.credibility import path_of, write_page
+    from epsmesh.report.study import DatasetError
+
+    check_output(path_of(path))
+    with refusing(DatasetError, file=path):
+        page = write_page(dataset, path_of(path), path.stem)
     say({"file": str(path), "page": str(page)}, str(page))
 
 

@@ -90,7 +90,7 @@ class Bar:
     """An error bar of F: its ``cause``, its largest ``share`` of F over the cases, and where it is from.
 
     A share that is not a number is not computed. ``said`` is what makes it smaller, if it is the largest. ``error`` is
-    the bar of the bar, a share of F, too, if it has one.
+    the bar of the bar, a share of F, too, if it has one. ``name`` is that of its variable.
     """
 
     cause: str
@@ -98,6 +98,7 @@ class Bar:
     said: str
     source: str = ""
     error: float = nan
+    name: str = ""
 
     @property
     def size(self) -> str:
@@ -114,7 +115,7 @@ def bars(dataset: xr.Dataset) -> list[Bar]:
             source = str(dataset[name].attrs.get("comment", "")) if name != "force_error" else ""
             subject = _within(dataset) if name == SPREAD else source.partition(" from ")[0]
             error = _largest(dataset, f"{name}_error") if f"{name}_error" in dataset else nan
-            found.append(Bar(cause, _largest(dataset, name), said.format(subject), source, error))
+            found.append(Bar(cause, _largest(dataset, name), said.format(subject), source, error, name))
     return found
 
 
