@@ -4,11 +4,13 @@ import re
 import tomllib
 from dataclasses import replace
 from html import unescape
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from epsmesh.plan.plan import make_plan
 from epsmesh.report import credibility
 from epsmesh.report.credibility import near
 from epsmesh.report.credibility.inputs import inputs
@@ -18,7 +20,7 @@ from epsmesh.report.study import study_of
 from epsmesh.report.words import percent
 from epsmesh.shapes.registry import BODIES, PROBES
 from epsmesh.shapes.tissue import LAWS
-from epsmesh.study.read import parse
+from epsmesh.study.read import parse, read_study
 from epsmesh.viscoelastic import Motion
 from tests import organs
 from tests.cases import raw
@@ -28,6 +30,7 @@ from tests.insertion import test_needle as needles
 from tests.report.synthetic import dataset
 from tests.verification.scenes import every
 
+ROOT = Path(__file__).parents[2]
 ONE = {"mesh": {"epsilon": "8 mm"}}
 STATED = {
     "question": "Is <b>20 mN</b> enough?",
@@ -209,6 +212,23 @@ def test_every_kind_of_study_has_a_page():
     assert "error bar not known" in text_of(dataset(failed=9, **ONE))
     assert "F is in proportion to E" in text_of(dataset(**ONE))
     assert "the meshes' F within" in text_of(dataset(mesh=sweep))
+
+
+def test_tools_of_an_array_have_inputs_of_their_own_that_are_not_known():
+    tools = [{"name": name, **raw()["probe"], "radius": f"{size} mm"} for name, size in (("thin", 2), ("thick", 4))]
+    data = dataset(**ONE, probe=tools)
+    study = study_of(data)
+    (swept, *_), (rest, *_) = inputs(data, study, near.scenes(study))
+    assert swept == "probe"
+    assert "probe[1].radius = 2 mm" in rest and "probe[2].radius = 4 mm" in rest
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("file", sorted(ROOT.glob("studies/*.toml")), ids=lambda file: file.stem)
+def test_every_shipped_study_has_a_page_even_before_its_run(file):
+    study = read_study(file)
+    if not study.lacking:
+        assert "No case has a force" in text_of(build(make_plan(study), {}))
 
 
 def test_tables_have_known_words_and_forces_within_their_bars():

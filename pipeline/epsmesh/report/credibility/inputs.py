@@ -65,7 +65,8 @@ def inputs(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> list[lis
 
 def values(study: Study) -> Iterator[tuple[str, str]]:
     """Yield the quantities of a study that are neither swept nor identified: places in its file, and values there."""
-    swept, identified = {axis.path for axis in study.axes}, {*map(repr, study.identified.estimate)}
+    swept = {axis.path for axis in study.axes if axis.key}
+    identified = {*map(repr, study.identified.estimate)}
 
     def within(place: str, value: Any) -> Iterator[tuple[str, str]]:
         if _NUMBER.sub(r"\1", place) in swept or str(value).partition(" ")[0] in identified:
