@@ -154,6 +154,8 @@ def test_a_needle_has_bars_of_its_puncture_and_the_balance_of_its_energies(needl
     assert here["depth"] == pytest.approx((12, 12))  # 6 mm of a shaft of 0.5 mm
     assert all("without insertion" in near.far(kind, here, one) for one in near.measured(kind, here))
     assert next(there.further for _, there, _ in near.near([kind])) == ("insertion",)  # the section of a shaft
+    assert "a smaller accuracy: at large displacements, F_exact would not be" in found
+    assert "exact = true" in text_of(dataset(**ONE))
     assert "probe.toughness = 5 J/m^2 none stated not known Validation" in found  # F is not in proportion to E
     assert "The speed of the tool is not known: give speed in [credibility]" in found
 

@@ -5,6 +5,7 @@ the ten rules of A. Erdemir et al., J. Transl. Med. 18, 369 (2020). Each stateme
 the tables of :mod:`.near`.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
@@ -26,6 +27,8 @@ from epsmesh.report.validation import unchecked
 from epsmesh.report.values import answer_of, at_peak
 from epsmesh.report.words import percent
 from epsmesh.states import OK
+from epsmesh.study.capabilities.obstacles import obstacle
+from epsmesh.study.case import Case
 from epsmesh.study.keys import keys_of
 from epsmesh.study.sweep import Study
 
@@ -89,7 +92,7 @@ def render(dataset: xr.Dataset, name: str) -> str:
         rows=len(rows),
         of_others=sum(any(word in row["source"] for word in _COMPUTED) for _, row in rows),
         discretisation=discretisation(dataset),
-        exact_asked="" if np.isfinite(dataset["force_exact"]).any() else "`exact = true` in [solve]",
+        exact_asked=_asked_of_exact(dataset, study, cases),
         balances=balances(dataset),
         tolerance=study.solve.energy_tolerance,
         failed=int((dataset["status"] != OK).sum()),
@@ -144,6 +147,16 @@ def discretisation(dataset: xr.Dataset) -> list[str]:
         said = f"{of_all} within {percent(distance)} of {of}" if distance else f"{of_all} is {of}, of the whole body"
         found.append(said if np.isfinite(distance) else f"{of} not known")
     return found
+
+
+def _asked_of_exact(dataset: xr.Dataset, study: Study, cases: Sequence[Case]) -> str:
+    """Say what gives the distance of F from a force without mesh error, if that is not known."""
+    if np.isfinite(dataset["force_exact"]).any():
+        return ""
+    why = next(filter(None, (obstacle("F_exact", case) for case in cases)), "")
+    if study.is_insertion or why:
+        return f"a smaller `accuracy`{why and f': {why}'}"
+    return "`exact = true` in [solve]"
 
 
 def balances(dataset: xr.Dataset) -> list[str]:
