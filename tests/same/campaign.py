@@ -15,7 +15,7 @@ import time
 import traceback
 from collections import Counter, defaultdict
 from collections.abc import Collection, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from epsmesh.study.toml import to_toml
@@ -27,17 +27,9 @@ from tests.same.judge import judge
 from tests.same.outcome import Outcome, solve
 from tests.same.pair import CHANGES, Pair
 from tests.same.scenes import draw, seconds
-from tests.same.ways import by_command
 
-# Changes that are tried of each scene; those of the command line take seconds, and are drawn less often.
+# Changes that are tried of each scene.
 _PER_SCENE = 8
-_LONG = {
-    "two ranks": 6,
-    "two shards": 12,
-    "killed and resumed": 8,
-    "run by the command line": 12,
-    "run by Python": 12,
-}
 _KEPT = ("differs", "one failed")
 _LIMIT = 900  # seconds that a scene may take
 _FINE_LIMIT = 5.0  # seconds that a study of a pair of fine scenes may take, as planned
@@ -67,8 +59,7 @@ def run_scene(
     """Run one scene with the changes that are drawn for it; what differs is written to ``kept`` as two studies."""
     study, features = draw(seed, folder, fine=fine)
     dice = random.Random(f"changes {seed}")
-    names = [name for name in CHANGES if dice.randrange(_LONG.get(name, 1)) == 0]
-    chosen = [name for name in dice.sample(names, len(names)) if not only or name in only]
+    chosen = [name for name in dice.sample([*CHANGES], len(CHANGES)) if not only or name in only]
     known: dict[str, Outcome] = {}
     rows: list[Row] = []
     for name in chosen:
@@ -83,8 +74,8 @@ def run_scene(
             continue
         if pair is None or (fine and _seconds(pair, folder) > _FINE_LIMIT):
             continue
-        row, other = _compare(Row(seed, features, name, "none"), pair, folder, change_dice, known)
-        rows.append(Row(**asdict(row) | {"seconds": time.process_time() - start}))
+        row, other = _compare(Row(seed, features, name, "none"), pair, folder, known)
+        rows.append(replace(row, seconds=time.process_time() - start))
         if row.result in _KEPT and kept is not None:
             keep(row, pair.first, other, kept)
     return rows
@@ -95,7 +86,7 @@ def _seconds(pair: Pair, folder: Path) -> float:
     return max(seconds(study, folder) for study in studies)
 
 
-def _compare(row: Row, pair: Pair, folder: Path, dice: random.Random, known: dict[str, Outcome]) -> tuple[Row, Study]:
+def _compare(row: Row, pair: Pair, folder: Path, known: dict[str, Outcome]) -> tuple[Row, Study]:
     text = json.dumps([pair.first, dict(pair.at_first)])
     if text not in known:
         known[text] = solve(pair.first, folder, at=pair.at_first)
@@ -105,24 +96,19 @@ def _compare(row: Row, pair: Pair, folder: Path, dice: random.Random, known: dic
         store = Path(scratch) / "cases.sqlite"
         if pair.before is not None:
             solve(pair.before, folder, store)
-        if pair.way == "here":
-            second = solve(other, folder, store, pair.at)
-        else:
-            second = by_command(pair.way, other, folder, Path(scratch), pair.at, dice)
+        second = solve(other, folder, store, pair.at)
     second = pair.related(second) if second.is_taken else second
     if pair.common and first.is_taken and second.is_taken:
         both = first.values.keys() & second.values.keys()
         first, second = first.only(both), second.only(both)
-    if "refused" in (first.kind, second.kind):
-        message = f"first: {first.message}" if first.kind == "refused" else f"second: {second.message}"
-        return Row(**asdict(row) | {"result": "refused", "what": message[:400]}), other
-    if {first.kind, second.kind} == {"taken", "failed"}:
-        message = f"first: {first.message}" if first.kind == "failed" else f"second: {second.message}"
-        return Row(**asdict(row) | {"result": "one failed", "what": message[:400]}), other
+    kinds = {first.kind, second.kind}
+    if "refused" in kinds or kinds == {"taken", "failed"}:
+        wrong, result = ("refused", "refused") if "refused" in kinds else ("failed", "one failed")
+        place, message = ("first", first.message) if first.kind == wrong else ("second", second.message)
+        return replace(row, result=result, what=f"{place}: {message}"[:400]), other
     verdict = judge(first, second, one_mesh=pair.one_mesh, allowed=pair.allowed)
     result = "differs" if not verdict.agrees else "same" if first.is_taken else "failed"
-    more = {"result": result, "what": verdict.what, "times": verdict.times, "one_mesh": verdict.is_one_mesh}
-    return Row(**asdict(row) | more), other
+    return replace(row, result=result, what=verdict.what, times=verdict.times, one_mesh=verdict.is_one_mesh), other
 
 
 def keep(row: Row, first: Study, second: Study, folder: Path) -> None:

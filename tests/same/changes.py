@@ -7,7 +7,6 @@ import copy
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -272,13 +271,6 @@ def _ellipse(study: Study, dice: random.Random) -> Pair | None:
     return Pair(study, other, one_mesh=False, common=True)
 
 
-@change("a tool whose edge is not rounded")
-def _edge(study: Study, dice: random.Random) -> Pair | None:
-    if study["probe"]["shape"] not in ("disc", "blade") or "edge" in study["probe"]:
-        return None
-    return Pair(study, copied(study, probe={"edge": "0 mm"}))
-
-
 @change("a box as a file")
 def _file(study: Study, dice: random.Random) -> Pair | None:
     if study["body"] != BASE["body"] or "insertion" in study["probe"]:
@@ -422,19 +414,6 @@ def _plain(study: Study, dice: random.Random) -> Pair | None:
     return Pair(study, copied(study, plan={"without": [*REDUCTIONS]}), one_mesh=False, common=True)
 
 
-@change("order of cases")
-def _reversed(study: Study, dice: random.Random) -> Pair | None:
-    swept = _swept(study)
-    if swept is None:
-        return None
-    first, at = swept
-    other = copy.deepcopy(first)
-    other["material"]["young"].reverse()
-    if "depth" in at:
-        other["probe"]["depth"].reverse()
-    return Pair(first, other, at=dict.fromkeys(at, 0), at_first=at)
-
-
 @change("depth in one step or in several")
 def _depths(study: Study, dice: random.Random) -> Pair | None:
     probe = study["probe"]
@@ -495,25 +474,6 @@ def _given_force(study: Study, dice: random.Random) -> Pair | None:
                                                         bars=force.numbers * found.bars / depth)})  # fmt: skip
 
     return Pair(study, at_force, one_mesh=False, related=as_force, common=True)
-
-
-def _by_way(way: str, study: Study, dice: random.Random) -> Pair:
-    return Pair(study, study, way=way)
-
-
-def _sweep_by_way(way: str, study: Study, dice: random.Random) -> Pair | None:
-    found = _swept(study)
-    return found and Pair(found[0], found[0], at=found[1], at_first=found[1], way=way)
-
-
-for _name, _made, _way in (
-    ("two ranks", _by_way, "two ranks"),
-    ("two shards", _sweep_by_way, "two shards"),
-    ("killed and resumed", _sweep_by_way, "killed"),
-    ("run by the command line", _by_way, "command"),
-    ("run by Python", _by_way, "python"),
-):
-    change(_name)(partial(_made, _way))
 
 
 # ---- outputs ------------------------------------------------------------------------------------------------

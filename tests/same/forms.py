@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from tests.pairs import Study, pieces
-from tests.same.outcome import Value
-from tests.same.pair import FLAT, Pair, change, copied, has, is_large, with_values, without
+from tests.same.pair import FLAT, Pair, change, copied, has, is_large, without
 from tests.same.quantities import number_of, times
 
 _LONG = ("blade", "wedge", "ellipse")  # tools with two ends that are the same
 _DIRECTED = (*_LONG, "pyramid")
 _PIECES = ("layer", "inclusion", "region")
-_RATIOS = (0.25, 0.28, 0.31, 0.34, 0.37, 0.4, 0.43)
 
 
 @change("defaults written out")
@@ -139,17 +137,6 @@ def _sticking(study: Study, dice: random.Random) -> Pair | None:
     return Pair(one, two, one_mesh=False, allowed=0.01, common=True, related=gone)
 
 
-@change("axes of a ball")
-def _ball(study: Study, dice: random.Random) -> Pair | None:
-    if not has(study, "inclusion"):
-        return None
-    other = copy.deepcopy(study)
-    for inclusion in other["body"]["inclusion"]:
-        if "radius" in inclusion:
-            inclusion["axes"] = [inclusion.pop("radius")] * 3
-    return Pair(study, other, one_mesh=False, common=True)
-
-
 @change("terms of a law or of relaxation in two")
 def _terms(study: Study, dice: random.Random) -> Pair | None:
     other = copy.deepcopy(study)
@@ -182,29 +169,6 @@ def _table(study: Study, dice: random.Random) -> Pair | None:
     return Pair(study, other, at={"time": -1}, at_first={"time": -1}, one_mesh=False, common=True)
 
 
-@change("an epsilon beyond the body, or full")
-def _full(study: Study, dice: random.Random) -> Pair | None:
-    mesh = study["mesh"]
-    if "epsilon" not in mesh or mesh.get("outside") != "coarse":
-        return None
-    # F_max is that of the study's own case of `full`.
-    return Pair(copied(study, mesh={"epsilon": "1 m"}), copied(study, mesh={"epsilon": "full"}), common=True,
-                related=lambda two: with_values(two, _not_of_full))  # fmt: skip
-
-
-def _not_of_full(name: str, value: Value) -> Value | None:
-    return None if name.endswith(("_ratio", "_max")) else value
-
-
-@change("a list of one value")
-def _one(study: Study, dice: random.Random) -> Pair:
-    other, at = copy.deepcopy(study), {}
-    for section, key in (("material", "young"), ("material", "poisson"), ("probe", "depth"), ("mesh", "epsilon")):
-        if key in other[section] and not ("history" in study["probe"] and key == "depth"):
-            other[section][key], at[key] = [other[section][key]], 0
-    return Pair(study, other, at=at)
-
-
 @change("one of several bodies, tools and materials")
 def _tables(study: Study, dice: random.Random) -> Pair | None:
     """A sweep over tables of a section, of which one is the study's."""
@@ -230,17 +194,6 @@ def _tables(study: Study, dice: random.Random) -> Pair | None:
     tables = [other[section] | {"name": "mine"}, second | {"name": "another"}]
     other[section] = tables if at == 0 else tables[::-1]
     return Pair(study, other, at={section: at}, common=True)
-
-
-@change("one of many Poisson's ratios")
-def _ratio(study: Study, dice: random.Random) -> Pair | None:
-    poisson = study["material"]["poisson"]
-    if "insertion" in study["probe"] or "accuracy" in study["mesh"] or poisson >= 0.45 or is_large(study):
-        return None
-    ratios = sorted({*_RATIOS, poisson})
-    other = copied(study, material={"poisson": ratios})
-    return Pair(study, other, at={"poisson": ratios.index(poisson)}, allowed=2e-6, common=True,
-                related=without("max_strain"))  # fmt: skip
 
 
 @change("more is asked for")

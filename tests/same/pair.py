@@ -21,8 +21,7 @@ class Pair:
     The second may need the results of the first. ``one_mesh``: they should be solved on the same mesh. ``allowed`` is
     the relative difference of the scenes themselves. ``at`` and ``at_first`` are the places along the dimensions of a
     sweep. ``before`` runs first, with the store of the second. ``common``: only variables that both have are compared.
-    ``related`` turns the results of the second into what those of the first should be. ``way`` is how the second runs:
-    see :mod:`tests.same.ways`.
+    ``related`` turns the results of the second into what those of the first should be.
     """
 
     first: Study
@@ -34,7 +33,6 @@ class Pair:
     before: Study | None = None
     common: bool = False
     related: Callable[[Outcome], Outcome] = lambda outcome: outcome
-    way: str = "here"
 
 
 Change = Callable[[Study, random.Random], Pair | None]
