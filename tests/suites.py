@@ -43,10 +43,12 @@ NIGHTLY = (
     "tests/test_same.py::test_what_may_not_matter_does_not",
     "tests/fuzz/test_large.py",
     "tests/cluster",
-    # Further variants of ways through mesher and solver, whose every line other tests of the day run.
+    # Further variants of ways through mesher, solver and commands, whose every line other tests of the day run.
     *(
         f"tests/{test}"
         for test in (
+            "cli/test_output.py::test_a_reader_that_goes_away_ends_nothing",
+            "identify/cli/test_identify.py::test_a_rank_that_fails_alone_ends_all",
             "insertion/test_command.py::test_two_layers_have_two_punctures_and_a_withdrawal_by_solves",
             "mesh/test_meeting_regions.py::test_a_border_of_an_image_has_the_force_of_a_layer_that_the_kernel_draws",
             "mesh/test_meeting_regions.py::test_a_hollow_region_leaves_its_neighbours_alone",
@@ -72,6 +74,8 @@ NIGHTLY = (
             "solve/test_ring_crack.py::test_the_bar_has_what_the_end_of_the_body_changes_in_tough_tissue",
             "solve/test_sliding.py::test_drag_of_an_inclined_path_is_the_law_times_the_force",
             "solve/test_sliding.py::test_friction_on_a_surface_that_gravity_has_bent",
+            "test_cli.py::test_a_rank_that_alone_knows_a_reason_tells_it",
+            "test_cli.py::test_interrupted_run_leaves_what_is_done_and_goes_on",
         )
     ),
 )
