@@ -39,11 +39,6 @@ def test_an_image_runs_by_a_user_and_installs_libraries_before_sources(target):
     assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
 
 
-def test_the_image_without_a_target_is_the_program():
-    assert list(STEPS["stages"](DOCKERFILE))[-1] == "epsmesh"
-    assert "STEPS=Dockerfile" in (ROOT / "Makefile").read_text()
-
-
 def test_steps_are_done_as_docker_does_them(tmp_path):
     """Folders are copied by content, variables are known to the next line, a failed line ends it."""
     text = 'FROM debian:13 AS one\nWORKDIR w\nENV A=b\nCOPY --chown=root from to/here\nRUN echo "$A" > got\n'
@@ -56,26 +51,6 @@ def test_steps_are_done_as_docker_does_them(tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "w" / "to" / "here" / "file").read_text() == "x"
     assert (tmp_path / "w" / "got").read_text() == "b\n"
-
-
-def test_the_hosted_workflow_says_what_never_ran_and_names_what_there_is():
-    yaml = pytest.importorskip("yaml")
-    text = (ROOT / ".github" / "workflows" / "tests.yml").read_text()
-    assert "No hosted runner has run this file yet" in text
-    jobs = yaml.safe_load(text)["jobs"]
-    assert jobs["debian"]["strategy"]["matrix"]["suite"] == ["12", "13", "sid"]
-    assert jobs["wheels"]["strategy"]["matrix"]["python"] == ["3.12", "3.13"]
-    lines = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
-    targets = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    assert {line.split()[1] for line in lines if line.startswith("make ")} <= targets
-    assert {line.split("--target ")[1].split()[0] for line in lines if "--target" in line} <= set(
-        STEPS["stages"](DOCKERFILE)
-    )
-    environment = (ROOT / "environment.yml").read_text()
-    assert "It has never run" in environment
-    known = yaml.safe_load(environment)
-    assert (known["name"], known["channels"]) == ("epsmesh", ["conda-forge"])
-    assert jobs["conda"]["steps"][1]["with"]["activate-environment"] == known["name"]
 
 
 def system_libraries(text):

@@ -10,7 +10,6 @@ import nibabel
 import numpy as np
 import pytest
 
-from epsmesh.shapes.files.image import read_image
 from epsmesh.shapes.files.read import read_surface
 from epsmesh.study.read import read_study
 
@@ -54,15 +53,6 @@ def test_they_bound_tissue_and_need_no_mending(name: str, volume: float):
     assert loaded.notices == ()
     assert 1e6 * loaded.triangles.volume == pytest.approx(volume, rel=0.01)
     assert (MESHES / name).stat().st_size < 400_000
-
-
-def test_the_image_holds_the_liver_of_the_surface():
-    surface, image = (
-        read_surface(MESHES / "liver.stl", 1e-3).triangles,
-        read_image(MESHES / "liver.nii.gz", 1).triangles,
-    )
-    assert image.volume == pytest.approx(surface.volume, rel=2e-3)
-    assert np.allclose(image.bounds, surface.bounds, atol=5e-4)
 
 
 def test_the_patients_labels_have_their_names_and_do_not_touch(script: ModuleType):

@@ -45,19 +45,6 @@ def test_figures_exist_and_tell_what_draws_them():
             assert f'"{figure}": (' in (ROOT / script).read_text(encoding="utf-8")
 
 
-def test_commands_exist():
-    said = re.findall(r"`(make|python -m|python|epsmesh) ([\w./]+)", PAPER)
-    assert {kind for kind, _ in said} == {"make", "python -m", "python", "epsmesh"}
-    for kind, name in said:
-        if kind == "make":
-            assert re.search(rf"^{name}:", (ROOT / "Makefile").read_text(), re.MULTILINE), name
-        elif kind == "epsmesh":
-            assert (ROOT / "pipeline" / "epsmesh" / "cli" / f"{name}.py").is_file(), name
-        else:
-            place = ROOT / (name.replace(".", "/") if kind == "python -m" else name)
-            assert place.is_file() or place.with_suffix(".py").is_file() or (place / "__main__.py").is_file(), name
-
-
 def test_references_are_cited_and_can_be_found():
     entries = dict(re.findall(r"^@\w+\{(\w+),\n(.*?)^\}", BIBLIOGRAPHY, re.MULTILINE | re.DOTALL))
     assert len(entries) == BIBLIOGRAPHY.count("\n@") + 1
@@ -65,12 +52,3 @@ def test_references_are_cited_and_can_be_found():
     for name, entry in entries.items():
         keys = set(re.findall(r"^  (\w+) +=", entry, re.MULTILINE))
         assert keys & {"doi", "url"} or "note" in keys, f"{name} has neither DOI nor address, nor a note that says why"
-
-
-def test_citation_names_what_the_paper_builds_on():
-    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    found = re.findall(r"^    doi: (\S+)$", citation, re.MULTILINE)
-    assert len(found) >= 5
-    for doi in found:
-        assert f"{{{doi}}}" in BIBLIOGRAPHY, doi
-    assert "preferred-citation" not in citation  # the paper is not published

@@ -148,13 +148,6 @@ def test_what_cannot_be_read_is_named_with_its_reason(folders, file, why):
     assert why in line
 
 
-def test_other_mistakes_are_told_in_the_same_breath(folders):
-    path = written(folders[0], "none.stl")
-    path.write_text(path.read_text().replace("0.45", "0.6"))
-    with pytest.raises(StudyError, match=r"(?s)cannot be read.*poisson|poisson.*cannot be read"):
-        read_study(path)
-
-
 def test_names_are_shown_as_they_are():
     tables = [raw()["probe"] | {"name": name} for name in ("a\x1b[2J", "b")]
     with pytest.raises(StudyError, match=r"probe\[1\].name.*control characters"):

@@ -48,19 +48,6 @@ def test_what_cannot_be_exported_is_refused(tmp_path, contact, arguments, word):
 LONGEST = 30
 
 
-@pytest.mark.parametrize(
-    ("line", "word"),
-    [
-        ("axis = [0.3, 0.0, -1.0]", "probe.axis: tools of a real-time model press straight down"),
-        ('motion = "all"', 'probe.motion = "all": real-time models are only for tools that press'),
-    ],
-)
-def test_a_refused_tool_is_named_by_its_key(tmp_path, line, word):
-    (tmp_path / "mine.toml").write_text(STUDY.format(contact="bonded").replace("[mesh]", f"{line}\n[mesh]"))
-    ran = epsmesh("export", tmp_path / "mine.toml", "--model", tmp_path / "model.nc")
-    assert (ran.exit_code, word in ran.stderr) == (2, True), ran.stderr
-
-
 def children(process):
     """Return the ranks that a launcher has started, itself or by a helper."""
     found = psutil.Process(process).children(recursive=True)

@@ -6,11 +6,8 @@ import shutil
 import pytest
 
 from epsmesh.report.dataset import write
-from epsmesh.report.guide import USUAL_ACCURACY, guide, guide_if_any
-from epsmesh.report.guide_tables import settings
 from epsmesh.run.record import Record
 from epsmesh.run.store import Store
-from epsmesh.shapes.probes.blade import Blade
 from tests.commands import ROOT, names
 from tests.report.chosen import TEXT, dataset
 
@@ -144,21 +141,6 @@ def test_pruning_says_first_what_would_go(epsmesh, tmp_path):
     assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["sound"]
     assert json.loads(epsmesh("status", "--store", path, "--json").stdout)["records"] == 3
     assert "no record to remove, 3 stay" in epsmesh(*words[:-1]).stdout
-
-
-def test_report_and_guide_agree_on_every_number():
-    data = dataset()
-    found, section = guide(data, USUAL_ACCURACY), guide_if_any(data)
-    tables = [settings(one.verdicts, one.scenes, has_full=one.has_full) for one in (found, section)]
-    assert tables[0].equals(tables[1])
-    words = found.text(verbose=True)
-    details = [told for _, told in section.details]
-    assert all(line in words for line in (section.sentence, *details, *section.others))
-    # What takes longest in one scene is not what it usually takes: neither stands for the other.
-    slow = dataset(seconds=lambda case: 1 + 9 * (case.material.poisson > 0.35) * isinstance(case.probe, Blade))
-    found = guide_if_any(slow)
-    table = settings(found.verdicts, found.scenes, has_full=found.has_full)
-    assert (table["longest time"] != table["median time"]).all()
 
 
 def test_the_how_to_of_a_refusal_is_a_page(epsmesh, small, here):

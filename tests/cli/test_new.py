@@ -186,9 +186,7 @@ def test_the_evaluator_in_c_is_copied_and_nothing_overwritten(elsewhere):
     names = json.loads(done.stdout)["files"]
     assert {"epsmesh.h", "epsmesh.c", "epsmesh_patch.h", "src/patch.c", "examples/unity.c"} <= {*names}
     for name in names:
-        assert (elsewhere / "mine" / "c" / name).read_text() == (
-            STUDIES.parent / "pipeline" / "epsmesh_realtime" / "c" / name
-        ).read_text()
+        assert (elsewhere / "mine" / "c" / name).read_text() == (SOURCES / name).read_text()
     (elsewhere / "mine" / "c" / "epsmesh.h").unlink()
     again = epsmesh("export", "--evaluator", "mine/c")
     assert (again.exit_code, "is not overwritten" in again.stderr) == (2, True)

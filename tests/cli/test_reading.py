@@ -113,12 +113,6 @@ def test_a_plan_of_which_nothing_fits_into_memory_ends_with_1(epsmesh, small):
     assert (some.exit_code, "steps do not fit" in some.stderr) == (0, True)
 
 
-def test_the_story_of_a_case_tells_what_the_plan_used(epsmesh, small):
-    for without, words in (([], "F is proportional"), (["--without", "scaling"], "one solve, on the same mesh")):
-        told = json.loads(epsmesh("plan", small, "0", *without, "--json").stdout)
-        assert words in told["changes"]["young, depth"]
-
-
 def test_a_case_that_some_labels_name_is_said_to_be_the_first_of_several(epsmesh, small):
     done = epsmesh("plan", small, "poisson=0.4")
     assert done.stdout.startswith("poisson = 0.4, epsilon = 4 mm, outside = coarse")

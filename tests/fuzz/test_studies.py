@@ -198,8 +198,3 @@ def test_what_was_found_stays_mended(name):
     with pytest.raises(StudyError) as refused:
         parse(raw() | changes if "mesh" not in changes else raw(**changes))
     assert message in str(refused.value)
-
-
-def test_an_empty_section_is_a_missing_one():
-    with pytest.raises(StudyError, match=r"\[probe\]: this section is required"):
-        parse(raw() | {"probe": {}})

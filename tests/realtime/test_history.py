@@ -193,22 +193,3 @@ def test_a_file_has_the_relaxation_and_none_that_gains_modulus(tmp_path):
         write_model(tmp_path / "model.epsm", replace(random_model(), relaxation=wrong), {}, {})
         with pytest.raises(ModelError, match="relaxation"):
             read(tmp_path / "model.epsm")
-
-
-def test_a_history_is_that_of_a_study(tmp_path):
-    """The study's force over time, in units of its elastic force, is that of a disc here."""
-    relaxation = [{"share": share, "time": f"{time} s"} for share, time in TERMS]
-    history = {"table": [["0 s", "0 mm"], ["1 s", "0.2 mm"], ["5 s", "0.15 mm"], ["6 s", "0.2 mm"]]}
-    study = {
-        "body": {"shape": "cylinder", "radius": "20 mm", "height": "20 mm"},
-        "material": {"young": "10 kPa", "poisson": 0.45, "relaxation": relaxation},
-        "probe": {"shape": "disc", "radius": "2 mm", "contact": "frictionless", "history": history},
-        "mesh": {"accuracy": "10 %"},
-    }
-    data = epsmesh.read(study, name="ramp").run(output=tmp_path).squeeze()
-    times = data["time"].values[1:]
-    depths = data["tool_depth"].values[1:]
-    found = forces(pressed(DISC, times, depths))[:, 2]
-    elastic = relaxing().query(**DISC, depth=2e-4).force[2]
-    ratio = data["force"].values[1:] / float(data["force_elastic"])
-    np.testing.assert_allclose(found / elastic, ratio, rtol=1e-9)

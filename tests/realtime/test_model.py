@@ -81,21 +81,6 @@ def test_a_body_that_is_a_half_space_gives_the_closed_forms():
     assert bonded == pytest.approx(known.half_space_disc(1.0, 0.3, 2e-3, 1e-4, "bonded")[0])
 
 
-@pytest.mark.parametrize(("name", "sizes"), TOOLS)
-@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"is_round": True, "is_even": False}])
-def test_a_closed_loop_does_no_work(name, sizes, kind):
-    model = random_model(**kind)
-    angle, weight = 2 * pi * np.arange(64) / 64, 2 * pi / 64
-    places = np.stack([0.008 + 0.006 * np.cos(angle), 0.01 + 0.005 * np.sin(angle), 0 * angle], axis=1)
-    depths = 3e-4 + 5e-5 * np.sin(angle + 1)
-    forces = np.array([deep(model, name, sizes, d, at).force for d, at in zip(depths, places, strict=True)])
-    moved = np.stack([-0.006 * np.sin(angle), 0.005 * np.cos(angle), -5e-5 * np.cos(angle + 1)], axis=1)
-    stored = 0.4 * forces[0, 2] * depths[0]
-    assert abs(weight * (forces * moved).sum()) < 1e-8 * stored
-    # It is the force aside that makes it so.
-    assert abs(weight * (forces * moved)[:, 2].sum()) > 1e-4 * stored
-
-
 @pytest.mark.parametrize(("name", "sizes"), TOOLS[:3])
 @pytest.mark.parametrize("is_round", [False, True])
 def test_nor_does_one_over_a_curved_face(name, sizes, is_round):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from epsmesh.report import accessor  # noqa: F401 (registers dataset.epsmesh)
-from tests.report.chosen import TEXT, dataset
+from tests.report.chosen import dataset
 from tests.report.synthetic import EPSILONS, FIGURE
 from tests.report.synthetic import dataset as synthetic
 
@@ -85,4 +85,4 @@ def test_many_scenes_are_drawn_as_bands():
 
 
 def test_guide_is_that_of_the_command():
-    assert dataset(TEXT).epsmesh.guide("5%").answer.labels["epsilon"] == 4e-3
+    assert dataset().epsmesh.guide("5%").answer.labels["epsilon"] == 4e-3

@@ -21,14 +21,6 @@ def other(old="", new="", **changes):
     return dataset(TEXT.replace(old, new), **changes)
 
 
-def test_a_dataset_agrees_with_itself():
-    found = compare(dataset(), dataset())
-    assert (found.agrees, found.cases, found.only_a, found.only_b) == (True, 28, (), ())
-    assert (found.again_a, found.again_b) == (4, 4)
-    assert {pair.difference for pair in found.pairs} == {0.0}
-    assert found.times == (1.0, 1.0, 1.0)
-
-
 def test_matched_by_values_not_by_order_or_by_names():
     """Axes the other way round, tables renamed and turned, lengths in other units: the same cases."""
     turned = other('name = "needle"', 'name = "pin"').attrs["study"]

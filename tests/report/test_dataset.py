@@ -20,16 +20,6 @@ from tests.organs import ellipsoid, write_stl
 from tests.report.synthetic import FIGURE, dataset
 
 
-def test_dimensions_are_what_the_study_sweeps():
-    data = dataset(**FIGURE)
-    assert list(data["force"].sizes.items()) == [("poisson", 4), ("probe", 2), ("epsilon", 7), ("outside", 3)]
-    assert list(data["force_vector"].sizes.items())[4:] == [("component", 3)]
-    assert data["epsilon"].attrs["units"] == "m"
-    assert np.isinf(data["epsilon"].values[-1])
-    assert all("long_name" in variable.attrs for variable in data.data_vars.values())
-    assert dataset()["force"].dims == ()
-
-
 def test_ratios_are_to_the_full_order_of_the_same_scene():
     data = dataset(**FIGURE)
     full = data.sel(epsilon=np.inf)
@@ -68,15 +58,6 @@ def test_what_was_skipped_and_why_is_kept():
     assert skipped["scaling"]["count"] == 2
     assert "proportional" in skipped["scaling"]["reason"]
     assert data.attrs["study_file"] == "study"
-
-
-def test_written_file_opens_with_xarray_alone(tmp_path):
-    data = dataset(failed=1, **FIGURE)
-    write(data, tmp_path / "deep" / "a.nc")
-    with xr.open_dataset(tmp_path / "deep" / "a.nc") as again:
-        xr.testing.assert_identical(again["force_ratio"].load(), data["force_ratio"])
-        assert again.attrs["host"] == "here"
-        assert float(again["force"].sel(epsilon=10e-3, poisson=0.3, probe="disc, pierce", outside="free")) > 0
 
 
 def test_earlier_result_survives_a_failed_write(tmp_path):

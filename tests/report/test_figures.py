@@ -52,12 +52,6 @@ def test_every_study_gets_the_figures_that_suit_it(tmp_path, name):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths)
 
 
-@pytest.mark.parametrize("mesh", [{}, {"epsilon": ["6 mm"]}, {"epsilon": ["full"]}])
-def test_the_force_of_one_case_is_a_number_and_no_figure(tmp_path, mesh):
-    data = dataset(mesh=mesh)
-    assert choose(data) == draw(data, tmp_path / "a") == []
-
-
 def test_the_curves_of_the_main_figure_are_the_numbers_of_the_dataset():
     """Every F/F_max and every speed-up is drawn, at its ε, in the panel of its scene."""
     data = dataset(**FIGURE)

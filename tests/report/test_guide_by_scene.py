@@ -7,7 +7,7 @@ import pytest
 
 from epsmesh.cli.console import plain
 from epsmesh.report.guide import guide
-from tests.report.chosen import BAR, TEXT, dataset
+from tests.report.chosen import TEXT, dataset
 
 BALL = """
 title = "deep"
@@ -58,13 +58,6 @@ def test_without_exact_forces_f_is_compared_with_that_of_the_full_order(deep):
     assert "±" not in text
     assert "F_exact" not in found.text(verbose=True)
     assert "of F_max" in str(guide(deep.sel(outside=["free"], epsilon=[6e-3, 10e-3, inf]), "1e-9"))
-
-
-def test_with_exact_forces_bars_count():
-    found = guide(dataset(), "5%")
-    assert found.reference == "F_exact"
-    assert found.answer.force_bar == pytest.approx(1.02 * BAR)
-    assert not found.parts
 
 
 def test_each_depth_and_law_has_its_answer(deep):

@@ -87,12 +87,6 @@ def test_a_table_may_pull():
     assert (data["force_error"] >= 0).all()
 
 
-def test_a_study_without_a_history_has_no_time():
-    data = dataset()
-    assert "time" not in data.dims
-    assert not {"force_elastic", "tool_depth", "dissipated_energy"} & {*data}
-
-
 def test_what_reads_a_dataset_reads_one_with_time(tmp_path):
     data = relaxing()
     assert choose(data)[0] == "history"
@@ -154,13 +148,6 @@ def test_stages_of_found_contact_become_time():
     for kind in choose(data):
         figure(data, kind)
     render(data, "found")
-
-
-def test_depths_of_found_contact_share_one_mesh_among_all_speeds():
-    plan = make_plan(study(probe=SPHERE | {"history": {"ramp": ["1 s", "3 s"]}}, mesh={"epsilon": "8 mm"}))
-    assert len(plan.solves) == 5
-    assert len(plan.meshes) == 1
-    assert [case.probe.depth for _, case in plan.study.whole_cases()] == [0.4e-3, 0.4e-3]
 
 
 def test_a_history_in_time_steps_is_in_the_dataset_like_any_other():

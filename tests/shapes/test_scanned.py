@@ -134,14 +134,6 @@ def test_keys_are_those_of_the_content(folder, tmp_path):
     assert case_key(case(folder / "ellipsoid.stl", fixed={"below": "-11 mm"})) != case_key(here)
 
 
-def test_a_file_that_changes_is_another_body(tmp_path):
-    path = write_stl(tmp_path / "body.stl", *ellipsoid(8))
-    before = case(path)
-    write_stl(path, *ellipsoid(9))
-    after = case(path)
-    assert before.body != after.body and case_key(before) != case_key(after)
-
-
 TUMOUR = {"name": "tumour", "at": ["0 mm"] * 3, "radius": "3 mm", "young": "1 kPa", "poisson": 0.3}
 
 
@@ -169,13 +161,6 @@ TEXT = (
     '[material]\nyoung = "1 kPa"\npoisson = 0.3\n[probe]\nshape = "disc"\nradius = "3 mm"\ndepth = "0.1 mm"\n'
     '[mesh]\naccuracy = "2 %"\n'
 )
-
-
-def test_a_file_is_sought_beside_the_study(folder):
-    from epsmesh.study.read import read_study
-
-    (folder / "s.toml").write_text(TEXT)
-    assert read_study(folder / "s.toml").case(()).body.extent == pytest.approx(120e-3, rel=2e-3)
 
 
 def test_a_file_that_changes_is_read_again_also_with_its_old_time_and_size(tmp_path):

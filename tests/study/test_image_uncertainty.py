@@ -58,13 +58,6 @@ def test_an_image_s_surface_is_shifted(image, offset):
     assert case.body.content != before.body.content
 
 
-def test_offsets_are_swept(image):
-    shifted = of(body(image, offset=["-1 mm", "0 mm", "1 mm"]))
-    assert [axis.name for axis in shifted.axes if len(axis) == 3] == ["offset"]
-    radii = [radius(case.body) for case in shifted.cases()]
-    np.testing.assert_allclose(np.diff(radii), 1.0, rtol=0.05)
-
-
 def test_a_surface_is_shifted_along_its_normals(tmp_path):
     write_stl(tmp_path / "box.stl", *box(0.02, 0.03, 0.01))
     before = read_surface(tmp_path / "box.stl", 1e-3)

@@ -68,13 +68,6 @@ def test_results_are_known_by_the_surface_not_by_how_it_was_come_by(crumbs, tmp_
     assert case_key(surface(plain, smooth="2 mm").case(())) not in keys
 
 
-def test_the_filter_is_swept_like_any_other_value():
-    of_filters = image(smooth=["2 mm", "4 mm"])
-    bodies = [of_filters.case((index,)).body for index in range(2)]
-    assert bodies[0].triangles.hash != bodies[1].triangles.hash
-    assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=2e-3)
-
-
 def test_elements_fit_between_a_footprint_and_what_is_held():
     """The gap is at least the height of the footprint's edge above the level."""
     (case,) = surface(MESHES / "liver.stl").cases()

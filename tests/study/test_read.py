@@ -403,14 +403,6 @@ def test_sweeps_become_dimensions_in_the_file_s_order():
     assert cases[-1].material.poisson == 0.4
 
 
-def test_array_of_tables_is_a_sweep_by_name():
-    content = raw()
-    content["probe"] = [{"name": "needle", **raw()["probe"]}, {"name": "knife", **BLADE}]
-    result = parse(content)
-    assert result.axes[0].labels == ("needle", "knife")
-    assert [case.probe.shape for case in result.cases()] == ["disc", "blade"]
-
-
 def test_a_list_that_all_tables_of_an_array_have_is_a_sweep():
     """Each table with each value: the array's dimension first, then that of the list."""
     content = raw()
@@ -428,11 +420,6 @@ def test_a_list_that_all_tables_of_an_array_have_is_a_sweep():
     content["probe"][1]["depth"] = depths[:2]
     with pytest.raises(StudyError, match="the same list in all tables"):
         parse(content)
-
-
-def test_points_and_sizes_sweep_as_lists_of_lists():
-    result = study(probe={"at": [["0 mm", "0 mm"], ["5 mm", "0 mm"]]})
-    assert [case.probe.at for case in result.cases()] == [(0.0, 0.0), (0.005, 0.0)]
 
 
 def test_equal_cases_have_equal_keys():

@@ -56,12 +56,6 @@ def test_mistakes_are_named(mistake):
     assert all(part in said for part in parts), said
 
 
-def test_only_what_has_a_flat_top_has_layers():
-    sections = raw(probe={"at": ["0 mm", "0 mm"]})
-    sections["probe"]["layer"] = [SKIN]
-    assert "probe.layer" in refusal(sections)
-
-
 def test_every_value_of_a_piece_is_swept():
     found = study(
         body={"layer": [SKIN | {"thickness": ["2 mm", "3 mm"]}], "inclusion": [BALL | {"radius": ["3 mm", "4 mm"]}]},
@@ -96,10 +90,6 @@ def test_forces_scale_with_all_moduli_together_only():
     assert reference_key(half, 1e-3) == reference_key(first, 1e-3)
     soft, stiff = study(body={"inclusion": [BALL]}, material={"young": ["10 kPa", "20 kPa"]}).cases()
     assert case_key(soft, scaled=True) != case_key(stiff, scaled=True)
-
-
-def test_a_body_of_one_material_has_the_key_it_always_had():
-    assert case_key(study().case(())) == case_key(study(body={"layer": [], "inclusion": []}).case(()))
 
 
 def test_the_same_layers_said_in_another_way_have_one_key():

@@ -5,7 +5,7 @@ import pytest
 from epsmesh.plan.plan import make_plan
 from epsmesh.study.problems import StudyError
 from epsmesh.study.read import parse
-from tests.cases import BLADE, raw, refusal
+from tests.cases import BLADE, raw
 
 BOX = {"shape": "box", "size": ["40 mm", "40 mm", "20 mm"], "fixed": "bottom"}
 SLIT = {**BLADE, "width": "1 mm", "incision": "4 mm"}
@@ -69,21 +69,6 @@ def test_inclusions_of_any_size_are_seen(at, beside):
     ((key, text),) = problems(probe={**SLIT, "ends": "open", "ahead": "0.3 mm", "width": "0.3 mm"}, body=body)
     assert key == "body.inclusion[1].at"
     assert ("the distance is 0.25 mm" if beside else "the slit cuts it") in text
-
-
-def test_lengths_have_units():
-    """A length that is refused is shown as it would be written."""
-    said = refusal(raw(probe={**BLADE, "ahead": "1 mm"}))
-    assert "1 mm" in said and "0.001" not in said
-
-
-def test_depths_are_not_scaled():
-    """The reason for which moduli are scaled does not promise it of depths: F has a part that does not grow with it."""
-    probe = {**SLIT, "depth": ["0.1 mm", "0.2 mm"]}
-    plan = make_plan(parse(raw(probe=probe, material={"young": ["1 kPa", "2 kPa"]})))
-    (scaling,) = (skipped for skipped in plan.skipped if skipped.name == "scaling")
-    assert scaling.count > 0
-    assert "mostly to the depth" in scaling.reason
 
 
 def test_no_incision():

@@ -202,14 +202,6 @@ def test_triangles_end_at_the_rim_of_the_contact(browser, tmp_path, kind):
 
 
 @in_browser
-def test_a_body_of_many_vertices_is_drawn(browser, tmp_path):
-    opened(browser, tmp_path, side=140)  # 39,200 of them
-    change(browser, depth=1)
-    assert browser.messages == []
-    assert told(browser, "legend") == "00.51 mm"
-
-
-@in_browser
 @pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True, "turned": True}])
 def test_places_without_an_answer_are_shaded_before_one_gets_there(browser, tmp_path, kind):
     surface, _ = opened(browser, tmp_path, **kind)

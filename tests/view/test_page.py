@@ -290,20 +290,6 @@ def test_turns_with_the_mouse_and_by_touch_and_zooms(browser, seen):
 
 
 @in_browser
-def test_turns_and_zooms_with_keys(browser, seen):
-    first = seen()
-    browser.ask("document.querySelector('canvas').focus()")
-    for key in ("ArrowLeft", "ArrowUp"):
-        browser.call("Input.dispatchKeyEvent", type="keyDown", key=key)
-        turned = seen()
-        assert differ(first, turned) > 0.1
-        first = turned
-    browser.call("Input.dispatchKeyEvent", type="keyDown", key="-")
-    assert drawn(seen()) < drawn(first)
-    assert browser.messages == []
-
-
-@in_browser
 def test_a_frame_that_gets_its_size_after_the_script_ran_is_drawn(browser, page, tmp_path):
     scene = escape(page.read_text(encoding="utf-8"))
     path = tmp_path / "frame.html"

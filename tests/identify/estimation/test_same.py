@@ -7,7 +7,7 @@ from epsmesh_identify.estimation.estimate import identify
 from epsmesh_identify.estimation.parts import Measured
 from epsmesh_identify.experiment.curve import Curve
 from epsmesh_identify.experiment.read import read_curve
-from epsmesh_identify.experiment.reading import ExperimentError, Reading
+from epsmesh_identify.experiment.reading import Reading
 from tests.identify.estimation.synthetic import YOUNG, Ball, Punch, measured, noise
 from tests.identify.experiment.curves import write
 
@@ -55,10 +55,3 @@ def test_units_and_zeros_change_nothing_and_fewer_rows_little(tmp_path, name):
     assert abs(thin[0] - whole[0]) < np.hypot(width, thin[2] - thin[1]) / 2
     assert 0.5 < (thin[2] - thin[1]) / width < 2.0
     assert thin[1] <= 2e4 <= thin[2]
-
-
-def test_rows_in_no_order_are_no_curve(tmp_path):
-    order = np.random.default_rng(1).permutation(240)
-    path = written(tmp_path / "shuffled.csv", curve_of("ball").curve, ("mm", 1e-3), ("mN", 1e-3), order)
-    with pytest.raises(ExperimentError, match="in no order"):
-        read_curve(path, Reading())

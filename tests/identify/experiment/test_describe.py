@@ -9,7 +9,7 @@ import pytest
 from epsmesh.study.read import parse
 from epsmesh_identify.experiment.describe import describe
 from epsmesh_identify.experiment.read import read_curve
-from epsmesh_identify.experiment.reading import ExperimentError, Reading
+from epsmesh_identify.experiment.reading import Reading
 from epsmesh_identify.sections.curves import curves_of
 from epsmesh_identify.sections.kept import measurements_of
 from tests.cases import raw
@@ -71,12 +71,6 @@ def test_a_column_of_another_unit_is_not_proposed(tmp_path, columns, chosen, lac
     found = block(said)["measurement"][0].get("columns", {})
     assert set(found) == chosen and not any("tress" in header for header in found.values())
     assert f"no column has the name and unit of {lacking}" in said
-
-
-def test_what_is_no_table_is_refused(tmp_path):
-    (tmp_path / "a.csv").write_text("Dear all,\nno curves today.\n")
-    with pytest.raises(ExperimentError):
-        describe(tmp_path / "a.csv")
 
 
 def test_a_spring_constant_in_the_header_is_told_and_pasted(tmp_path):

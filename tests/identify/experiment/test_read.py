@@ -144,12 +144,6 @@ def test_columns_by_name_without_their_unit_or_with_it(tmp_path):
     assert is_the_approach(read(path, columns={"depth": "depth", "force": "Force (mN)"}))
 
 
-def test_signs_are_found_and_told(tmp_path):
-    curve = read(write(tmp_path / "a.csv", {"time (s)": TIME, "z (mm)": -74 - 1e3 * DEPTH, "F (mN)": -1e3 * FORCE}))
-    assert is_the_approach(curve)
-    assert sum("sign is changed" in note for note in curve.notes) == 2
-
-
 def test_a_spring_and_its_deflection(tmp_path):
     stiffness = 50.0
     deflection = FORCE / stiffness
@@ -174,21 +168,6 @@ def test_segments_of_a_ramp_and_hold(tmp_path):
     assert np.ptp(hold.depth) < 0.02 * DEEP
     assert up.time is not None and hold.time is not None and hold.time[0] == pytest.approx(RAMP, abs=0.5)
     assert hold.force[-1] < 0.8 * up.force[-1]
-
-
-def test_without_a_hold_approach_and_retract_meet_at_the_deepest_row(tmp_path):
-    time, depth, force = cycle()
-    path = write(tmp_path / "a.csv", {"time (s)": time, "depth (mm)": 1e3 * depth, "force (mN)": 1e3 * force})
-    assert read(path).depth[-1] == pytest.approx(depth.max())
-    assert len(read(path, segment="retract").depth) == pytest.approx(200, abs=2)
-
-
-def test_a_noisy_depth_turns_once(tmp_path):
-    time, depth, force = cycle(hold=100)
-    noisy = depth + np.random.default_rng(2).normal(0, 5e-6, len(depth))
-    path = write(tmp_path / "a.csv", {"time (s)": time, "depth (µm)": 1e6 * noisy, "force (mN)": 1e3 * force})
-    assert len(read(path).depth) == pytest.approx(200, abs=8)
-    assert len(read(path, segment="hold").depth) == pytest.approx(100, abs=15)
 
 
 def test_cycles_are_apart(tmp_path):

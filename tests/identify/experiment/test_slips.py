@@ -265,22 +265,3 @@ def test_coarse_steps_of_the_force_are_not_saturation(tmp_path):
     steps = np.round(1e3 * FORCE / 4) * 4  # millinewtons, a sixteenth of the largest
     curve = read_curve(write(tmp_path / "a.csv", GOOD | {"force (mN)": steps}), Reading())
     assert curve.force.max() == pytest.approx(1e-3 * steps.max())
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_any_bytes_are_read_or_refused(tmp_path, seed):
-    """Rows of a good file with bytes replaced, cut and doubled: never another exception."""
-    rng = np.random.default_rng(seed)
-    good = write(tmp_path / "good.csv", GOOD).read_bytes()
-    path = tmp_path / "a.csv"
-    for _ in range(60):
-        data = bytearray(good)
-        for _ in range(int(rng.integers(1, 40))):
-            data[int(rng.integers(len(data)))] = int(rng.choice(list(b'0,.;"\n\t -e\xb5\xffx')))
-        cut = int(rng.integers(1, len(data)))
-        path.write_bytes(bytes(data[:cut]) if rng.random() < 0.3 else bytes(data))
-        try:
-            curve = read_curve(path, Reading())
-        except ExperimentError:
-            continue
-        assert np.isfinite(curve.depth).all() and np.isfinite(curve.force).all()

@@ -100,14 +100,6 @@ def test_a_parameter_that_cannot_act_has_no_index_and_no_bar():
     assert found.first_error.tolist() == found.total_error.tolist() == [0.0, 0.0]
 
 
-def test_the_dataset_names_what_was_varied():
-    study = read_mapping(PUNCH | {"sensitivity": VARIED}, "punch")
-    dataset = dataset_of(study, explain(study, solved_by(_punch)))
-    assert list(dataset["parameter"].values) == list(VARIED)
-    assert float(dataset["high"].sel(parameter="radius")) == pytest.approx(3e-3)
-    assert str(dataset["output_unit"].sel(output="force").values) == "N"
-
-
 @pytest.mark.parametrize("is_wide", [True, False])
 def test_its_bar_of_f_is_beside_those_of_the_study(is_wide):
     varied = VARIED if is_wide else {"young": ["10 kPa", "10.01 kPa"]}
@@ -226,12 +218,6 @@ def test_an_output_of_a_function_is_refused(tmp_path):
 def test_mistakes_are_told_by_their_key(section, message):
     with pytest.raises(StudyError, match=message):
         explain(read_mapping(PUNCH | section, "punch"), solved_by(_punch))
-
-
-def test_one_parameter_makes_all_of_the_spread():
-    study = read_mapping(PUNCH | {"sensitivity": {"poisson": [0.0, 0.5]}}, "punch")
-    (found,) = explain(study, solved_by(_punch))
-    assert found.indices.first == pytest.approx(1, abs=0.01) and found.indices.total == pytest.approx(1, abs=0.01)
 
 
 def test_an_output_that_no_parameter_changes_is_told():

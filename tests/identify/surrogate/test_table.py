@@ -85,12 +85,6 @@ def test_with_one_known_modulus_the_other_is_the_only_parameter():
     assert 1 < stiff / soft < 4
 
 
-def test_nothing_unknown_but_the_modulus_is_a_factor():
-    table = _built(LAYERED, {"young": (5e3, 2e4), "skin_young": (4e4, 6e4)}, _layered)
-    force = table.force(DEPTH, {"young": 1e4, "skin_young": 5e4})
-    np.testing.assert_allclose(table.force(DEPTH, {"young": 1.1e4, "skin_young": 5.5e4}), 1.1 * force)
-
-
 def test_it_refuses_what_it_does_not_span():
     table = _built(BALL, {"young": (1e3, 1e6), "poisson": (0.2, 0.4)}, hertz)
     with pytest.raises(ValueError, match=r"poisson = 0\.45 is not in its range, 0\.2 to 0\.4"):

@@ -145,14 +145,6 @@ def test_points_without_facets_and_bytes_after_the_last_one_do_no_harm(tmp_path:
     assert any("are ignored" in notice for notice in _load(tmp_path, "longer.stl", stl(BALL) + b"abc").notices)
 
 
-def test_a_file_is_read_again_only_when_it_has_changed(tmp_path: Path):
-    first = _load(tmp_path, "organ.stl", stl(BALL))
-    assert read_surface(tmp_path / "organ.stl", 1e-3) is first
-    assert read_surface(tmp_path / "organ.stl", 1e-2).triangles.volume == pytest.approx(1e3 * VOLUME, rel=1e-6)
-    larger = _load(tmp_path, "organ.stl", stl(ball(2)))
-    assert larger.triangles.hash != first.triangles.hash
-
-
 def test_the_hash_is_that_of_the_body_and_arrays_cannot_be_written_to(tmp_path: Path):
     one, other = (_load(tmp_path, name, WRITTEN[name]()).triangles for name in ("binary.stl", "solid.stl"))
     assert one.hash == other.hash
