@@ -32,6 +32,7 @@ _SHAFT = Kind("neo-hookean", further=("insertion",))
 _OTHERS = {
     "strip on a rigid base, wedge": Kind("linear", "unilateral", "box", "wedge"),
     "crack in a strip": Kind("linear", "bonded", "box", "blade", ("slit",)),
+    "ball with a capsule in a ball": Kind(),
     "plane strain": _SHAFT,
     "round slice": _SHAFT,
 }
