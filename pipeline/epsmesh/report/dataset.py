@@ -24,7 +24,7 @@ from epsmesh.report.uncertainty import uncertainties
 from epsmesh.report.values import at_full_order, with_flags
 from epsmesh.run.given_force import at_force, with_depths
 from epsmesh.run.outcome import without_contact
-from epsmesh.run.record import Record
+from epsmesh.run.record import RELATIVE, Record
 from epsmesh.shapes.frame import Frame, PlaceError
 from epsmesh.shapes.scanned import Scanned
 from epsmesh.states import NO_CONTACT, OK, PENDING
@@ -80,7 +80,7 @@ _PARTS = (
 # What a record calls otherwise than the dataset.
 _IN_RECORD = {"machine_load": "load"}
 # Error bars that a record has as a share of the value.
-_RELATIVE = {"force_error", "energy_release_error", "contact_area_error", "contact_radius_error"}
+_RELATIVE = {f"{name}_error" for name in RELATIVE}
 # What is known of a failed case, too: what it took, and by how much its error bars are too wide.
 _OF_FAILURES = {*_COSTS, *_RELATIVE, "machine_load", "memory", "surface_deviation", "depth_reached", "force_reached"}
 # Translations, and rotations about the axes of the point of contact.

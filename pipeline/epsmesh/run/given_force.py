@@ -12,16 +12,15 @@ from epsmesh.plan.given_force import DepthAtForce, Trial, next_depth
 from epsmesh.plan.plan import Plan, first_attempts, make_plan
 from epsmesh.plan.proportional_depths import depth_key
 from epsmesh.plan.reductions import REDUCTIONS
-from epsmesh.run.record import Record
+from epsmesh.run.record import RELATIVE, Record
 from epsmesh.states import FAILED, OK, PARTIAL, SKIPPED
 from epsmesh.study.case import Case
 from epsmesh.study.expected_depth import largest_depth
 from epsmesh.units import canonical
 
 _ENDED = "load steps end there"
-# Quantities that grow with the depth no faster than F, by whether their bars are relative.
-_RELATIVE = ("contact_area", "contact_radius", "energy_release")
-_ABSOLUTE = ("slip_area", "friction_force", "torque")
+# Quantities with a bar that grow with the depth, no faster than F.
+_OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
 
 
 @dataclass(frozen=True)
@@ -104,9 +103,8 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
 
 def _barred(record: Record, off: float) -> Record:
     """Return the record with bars that cover another depth: F there is off by this share, all else by no more."""
-    wider: dict[str, Any] = {f"{name}_error": getattr(record, f"{name}_error") + off for name in _RELATIVE}
-    for name in _ABSOLUTE:
-        wider[f"{name}_error"] = getattr(record, f"{name}_error") + off * abs(getattr(record, name))
+    more = {name: off if name in RELATIVE else off * abs(getattr(record, name)) for name in _OF_DEPTH}
+    wider: dict[str, Any] = {f"{name}_error": getattr(record, f"{name}_error") + by for name, by in more.items()}
     largest = dict(record.largest)
     for name, value in record.largest.items():
         if (bar := f"{name}_error") in largest:

@@ -28,18 +28,6 @@ from epsmesh.study.way import Constraint, Motion
 _ROUNDING = 1e-9
 # The mesh is graded to the axis. If first contact is farther away, in units of the half width, it is not graded to it.
 _BESIDE = 0.1
-BARS = (
-    "force_error",
-    "force_vector_error",
-    "stiffness_error",
-    "energy_release_error",
-    "load_force_error",
-    "contact_area_error",
-    "contact_radius_error",
-    "slip_area_error",
-    "friction_force_error",
-    "torque_error",
-)
 _OF_FRICTION = ("slip_area", "friction_force", "torque")
 # What loads add to a force that counts from the first touch of the surface as they leave it.
 _NOT_PRESSED = {"load_force": 0.0, "load_force_error": 0.0, "load_force_vector": (0.0, 0.0, 0.0)}
@@ -55,18 +43,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     case = solve.case
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
-        # Refined meshes have larger elements away from the edge: F has more of the errors of other places.
-        is_plain = case.is_plain and not is_refined(solve.meshed_case)
-        known = Convergence(
-            degree=case.mesh.degree,
-            element=case.way.element,
-            is_graded=is_graded_to_contact(case),
-            is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
-            has_others=not is_plain,
-            is_nonlinear=case.way.is_nonlinear,
-            is_ball=is_ball(case),
-        )
-        solution = solution.extrapolated(known)
+        solution = solution.extrapolated(convergence_of(solve))
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
@@ -100,6 +77,22 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         kind=kind,
         planned_cells=planned_cells,
         poisson=poisson,
+    )
+
+
+def convergence_of(solve: Solve) -> Convergence:
+    """Return what the case and the mesh of a solve say of how F converges with the degree."""
+    case = solve.case
+    # Refined meshes have larger elements away from the edge: F has more of the errors of other places.
+    is_plain = case.is_plain and not is_refined(solve.meshed_case)
+    return Convergence(
+        degree=case.mesh.degree,
+        element=case.way.element,
+        is_graded=is_graded_to_contact(case),
+        is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
+        has_others=not is_plain,
+        is_nonlinear=case.way.is_nonlinear,
+        is_ball=is_ball(case),
     )
 
 

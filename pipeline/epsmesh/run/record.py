@@ -16,21 +16,17 @@ from epsmesh.study.case import Scale
 # The prefix of the message of an unexpected failure.
 UNFORESEEN = "an error of the program: "
 
-# Quantities that are proportional to Young's modulus and to this power of the depth.
+# Quantities with a 95 % bar, NAME_error: relative to them, and in their unit.
+RELATIVE = ("force", "energy_release", "contact_area", "contact_radius")
+ABSOLUTE = ("force_vector", "stiffness", "load_force", "slip_area", "friction_force", "torque")
+BARS = tuple(f"{name}_error" for name in (*RELATIVE, *ABSOLUTE))
+
+# Quantities that are proportional to Young's modulus and to this power of the depth, with their bars in their unit.
 _POWERS = {
-    "force": 1,
-    "force_reached": 1,
-    "force_vector": 1,
-    "force_vector_error": 1,
-    "stiffness": 0,
-    "stiffness_error": 0,
-    "energy": 2,
-    "energy_release": 2,
-    "friction_force": 1,
-    "friction_force_error": 1,
-    "torque": 1,
-    "torque_error": 1,
-}
+    "force": 1, "force_reached": 1, "force_vector": 1, "stiffness": 0, "energy": 2, "energy_release": 2,
+    "friction_force": 1, "torque": 1,
+}  # fmt: skip
+_POWERS |= {f"{name}_error": power for name, power in _POWERS.items() if name in ABSOLUTE}
 
 # What the course of a case has by time, each with the power of the depth that it is proportional to: time (s), force
 # against the advance, its error from the steps, its components (N), dissipated energy and its error (J); contact area

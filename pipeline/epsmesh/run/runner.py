@@ -21,7 +21,7 @@ from epsmesh.run.begun import Begun
 from epsmesh.run.compile import prepare
 from epsmesh.run.failure import AloneError, Attempt, Failure
 from epsmesh.run.far_field import share_far_fields
-from epsmesh.run.measure import BARS, TIMES, record_of
+from epsmesh.run.measure import TIMES, record_of
 from epsmesh.run.memory import FreeMemory, PeakMemory, give_back
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.meshing import mesh_case, on_first_rank
@@ -37,7 +37,7 @@ from epsmesh.run.problem import (
 )
 from epsmesh.run.progress import MESHING, Progress
 from epsmesh.run.provenance import provenance
-from epsmesh.run.record import Record
+from epsmesh.run.record import BARS, Record
 from epsmesh.run.room import machine_load
 from epsmesh.solve.contact.sweep import NEAR
 from epsmesh.solve.newton import LargeError
