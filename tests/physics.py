@@ -17,7 +17,7 @@ ROOT = Path(__file__).parent.parent
 FILE = ROOT / "tests" / "physics.txt"
 # Folders and files of pipeline/epsmesh/ between a case and its record.
 SOURCES = (
-    *("shapes", "scene", "mesh", "solve", "insertion", "compat", "viscoelastic.py", "units.py"),
+    *("shapes", "scene", "mesh", "solve", "insertion", "compat", "fitted.py", "viscoelastic.py", "units.py"),
     *(f"study/{name}.py" for name in ("case", "closure", "loads", "output", "slit", "stages", "sweep")),
     *(f"plan/{name}.py" for name in ("far_fields", "ladders", "recipe", "reductions", "refinement", "symmetry")),
     *(

@@ -10,8 +10,9 @@ from typing import Self
 
 import scipy
 
+from epsmesh import fitted
 from epsmesh.insertion.curve import Curve
-from epsmesh.insertion.near_tip import EXTENSION_ERROR, NearTip, strength
+from epsmesh.insertion.near_tip import NearTip, strength
 from epsmesh.insertion.states import SHORT, Scene, Solved, Tissue
 from epsmesh.insertion.steps import CUTTING, Step
 
@@ -138,7 +139,7 @@ def _cutting(scene: Scene, depth: float, solved: float, cut: Solved) -> Cutting:
         fracture += 2 * height * end * layer.toughness
     widened, solved_front = 2 * field.per_length(ahead, solved), length + 2 * solved
     stored = cut.energy + added
-    energy_error = cut.force_error * cut.energy + EXTENSION_ERROR * abs(added) + share * moved
+    energy_error = cut.force_error * cut.energy + fitted.EXTENSION * abs(added) + share * moved
     force_error = cut.force_error * abs(cut.force) + solved_front * release_error
     return Cutting(
         phase=CUTTING,
@@ -149,7 +150,7 @@ def _cutting(scene: Scene, depth: float, solved: float, cut: Solved) -> Cutting:
         energy_error=energy_error,
         fracture=fracture,
         elastic=cut.force - solved_front * release + widened,
-        error=force_error + EXTENSION_ERROR * abs(widened) + 2 * share * field.strength,
+        error=force_error + fitted.EXTENSION * abs(widened) + 2 * share * field.strength,
         cutting=(length + 2 * ahead) * tissue.toughness,
         squeeze=2 * stored / width,
         squeeze_error=2 * energy_error / width,

@@ -9,13 +9,13 @@ depends on the shape of the flank alone, depth over length: within 1 % on Poisso
 
 from typing import TYPE_CHECKING
 
+from epsmesh import fitted
+
 if TYPE_CHECKING:
     from epsmesh.shapes.probes.blade import Blade
 
 # κ of a flank, fitted to solved slits: a strip at first, less as it gets deeper.
 _SHALLOW, _DEEPER = 0.57, 0.85
-# Relative error of what it adds: other bodies, layers, and drag that is no rigid motion of the faces.
-_ERROR = 0.5
 
 
 def reaction(depth: float, length: float) -> float:
@@ -31,5 +31,5 @@ def rub(blade: "Blade", depth: float, squeeze: float, error: float, *, inwards: 
     coefficient = blade.friction
     drag = reaction(depth, blade.length) * coefficient
     factor = 1 / (1 - drag) if inwards else 1 / (1 + drag)
-    uncertain = factor * error + _ERROR * abs(factor - 1) * squeeze
+    uncertain = factor * error + fitted.FLANKS * abs(factor - 1) * squeeze
     return 2 * coefficient * factor * squeeze, 2 * coefficient * uncertain

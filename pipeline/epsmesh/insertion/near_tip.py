@@ -13,10 +13,6 @@ stored energy follows by integration over the area of the slit.
 from dataclasses import dataclass
 from math import log, pi, sqrt
 
-# Relative error of what is integrated from the solved distance on: measured at 1/2 to 1/16 of it
-# (benchmarks/results/insertion.md).
-EXTENSION_ERROR = 0.01
-
 
 def strength(young: float, poisson: float, half: float) -> float:
     """Return C = a G (J/m) of a plate of ``half`` thickness (m) in an infinite body of these moduli (Pa, 1)."""

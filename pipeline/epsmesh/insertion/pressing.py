@@ -14,13 +14,12 @@ from typing import Self
 import numpy as np
 import scipy
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.states import Solved
 from epsmesh.insertion.steps import INDENTATION, Step
 
-# Relative error of what is interpolated from one depth to twice that, if none between was solved.
-_INTERPOLATED = 5e-3
 _TINY = 1e-6
 
 
@@ -42,7 +41,7 @@ class Solves:
         depths, energies, forces = np.array([(at, found[at].energy, found[at].force) for at in sorted(found)]).T
         own, last = cls(depths, energies, forces, max(one.force_error for one in found.values())), list(found)[-1]
         if last == depths[-1]:
-            return replace(own, bar=own.bar + _INTERPOLATED) if len(depths) > 1 else own
+            return replace(own, bar=own.bar + fitted.INTERPOLATED) if len(depths) > 1 else own
         others = depths != last
         energy, force = cls(depths[others], energies[others], forces[others], 0.0).at(last)
         missed = max(abs(energy / found[last].energy - 1), abs(force / found[last].force - 1))

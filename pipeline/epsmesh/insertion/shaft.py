@@ -19,6 +19,7 @@ from typing import Self
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.insertion.curve import Curve
 from epsmesh.insertion.states import Solved, Tissue
@@ -26,12 +27,10 @@ from epsmesh.insertion.steps import CUTTING, Step
 from epsmesh.shapes.insertion import Needle
 from epsmesh.shapes.section import in_mm
 
-# Free sides at a distance r take (b/r)² of e, s and N, within half of that: solved for r/b from 5 to 60 and three
+# Free sides at a distance r take (b/r)² of e, s and N, within a part of that: solved for r/b from 5 to 60 and three
 # toughnesses (benchmarks/results/needle.md). A fixed side adds 1/(1 − 2ν) times that: of a hole, at small strains. The
 # longest crack, in units of r.
-_UNSURE, _LONGEST = 0.5, 1 / 3
-# What the surface and a tip that is as high as the shaft's half width change at most, in units of e times that.
-_POINTED = 0.5
+_LONGEST = 1 / 3
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,9 @@ class ShaftCut:
             least = in_mm(half / _LONGEST)
             return f"its crack is {in_mm(half)} long to each side, beside which less than {least} are kept"
         ends = (half / beside) ** 2
-        lost, unsure = (0.0, min(ends / max(1 - 2 * tissue.poisson, ends), 1.0)) if held else (ends, _UNSURE * ends)
+        lost, unsure = ends, fitted.FREE_SIDES * ends
+        if held:
+            lost, unsure = 0.0, min(ends / max(1 - 2 * tissue.poisson, ends), 1.0)
         if is_ring and not held:
             lost, unsure = 0.0, ends
         stored, torn, squeeze = ((1 - lost) * one for one in (stored, deep.force - stored, squeeze))
@@ -119,7 +120,7 @@ class NeedleCut(Curve):
         """Yield the depth (m) of each layer's top, and what is not known there of the force of the shaft (N)."""
         forces = [layer.force for layer in self.layers]
         is_pointed = self.needle.tip_heights[-1] >= self.needle.limit
-        shares = [_POINTED if is_pointed else 1.0, *(1.0 for _ in forces[1:])]
+        shares = [fitted.POINTED if is_pointed else 1.0, *(1.0 for _ in forces[1:])]
         yield from zip(self.tops, (np.abs(np.diff([0.0, *forces])) * shares).tolist(), strict=False)
 
     def takes_more(self, number: int) -> bool:

@@ -12,18 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.insertion.cutting import Cutting, sides
 from epsmesh.insertion.friction import rub
-from epsmesh.insertion.near_tip import EXTENSION_ERROR
 from epsmesh.insertion.states import Scene
 from epsmesh.insertion.steps import WITHDRAWAL, Step
 
-# Relative error of the energy, and of the force, that a front far below the tip takes from those of cutting.
-_FAR_ERROR = 0.15
-# Relative error of the force by the change of the field with the depth, from differences of states.
-_CHANGE_ERROR = 0.3
-# Relative error of what a far front releases until it is where cutting ended, a fraction of a width away.
-_SHIFT_ERROR = 0.3
 _TINY = 1e-9
 
 
@@ -116,7 +110,7 @@ def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Ope
     corners = state.field.corners(state.ahead, beside) / 2
     added, widened = sides(scene, state.field, depth, beside) + corners, 2 * state.field.per_length(state.ahead, beside)
     stored = cut.energy + shift + added
-    error = cut.force_error * cut.energy + _SHIFT_ERROR * abs(shift) + EXTENSION_ERROR * abs(added)
+    error = cut.force_error * cut.energy + fitted.SHIFT_OF_FRONT * abs(shift) + fitted.EXTENSION * abs(added)
     elastic = cut.force + pull + widened
     return _at_rest(
         scene,
@@ -126,7 +120,7 @@ def _above(scene: Scene, state: Cutting, deepest: Cutting, front: float) -> _Ope
         energy_error=error,
         steady=elastic,
         elastic=elastic,
-        error=drive_error + _SHIFT_ERROR * abs(pull) + EXTENSION_ERROR * abs(widened),
+        error=drive_error + fitted.SHIFT_OF_FRONT * abs(pull) + fitted.EXTENSION * abs(widened),
     )
 
 
@@ -134,9 +128,9 @@ def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
     """Return the blade at the depth of a ``state`` of cutting, where κ changes by ``bending`` (1/m²) with the depth."""
     ahead, length, width, field = front - state.depth, scene.blade.length, scene.blade.width, state.field
     stored = state.stored - length * field.per_length(state.ahead, ahead)
-    energy_error = state.energy_error + _FAR_ERROR * length * max(field.per_length(width, ahead), 0.0)
+    energy_error = state.energy_error + fitted.FAR_FRONT * length * max(field.per_length(width, ahead), 0.0)
     pushed, changed = length * field.release(ahead), length * bending * field.by_bend(state.ahead, ahead)
-    far_error = _FAR_ERROR * pushed if ahead > width else 0.0
+    far_error = fitted.FAR_FRONT * pushed if ahead > width else 0.0
     return _at_rest(
         scene,
         state,
@@ -145,6 +139,6 @@ def _open(scene: Scene, state: Cutting, bending: float, front: float) -> _Open:
         energy_error=energy_error,
         steady=state.elastic + changed,
         elastic=state.elastic + changed + pushed,
-        error=state.error + far_error + _CHANGE_ERROR * abs(changed),
+        error=state.error + far_error + fitted.CHANGE_OF_FIELD * abs(changed),
         without_field=False,
     )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.plan.recipe import half_width_of
 from epsmesh.plan.steps import Solve
@@ -27,9 +28,6 @@ FEWEST, _LEAST = 8, 5
 _CLOSER = 0.7
 # Of one round: the number of further places as a share of those solved, and their least distance in units of the scale.
 _SHARE, _APART = 0.5, 0.4
-# Standard deviation of solved forces about a smooth function, as a share of their error bars: each place has another
-# mesh. Measured on discs over a liver and over a box with a tumour.
-_SCATTER = 0.05
 # A solved force counts for an interpolated one by its weight, as a share of the largest.
 _COUNTS = 0.1
 
@@ -128,7 +126,7 @@ class PlacePath:
         solved = [found[solve.key] for solve, is_known in zip(self.solves, known, strict=True) if is_known]
         if len(solved) < _LEAST or min(one.force for one in solved) <= 0:
             return None
-        scatter = _SCATTER * float(np.median([one.force_error for one in solved]))
+        scatter = fitted.SCATTER * float(np.median([one.force_error for one in solved]))
         values = np.log([one.force for one in solved])
         return Field(self.places[known], self.scales[known], values, scatter if isfinite(scatter) else 0.0)
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from dolfinx import fem
 
-from epsmesh import compat
+from epsmesh import compat, fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.run.samples import dataset_of, in_plane, plane_axes
 from epsmesh.run.solved import Solved
 from epsmesh.solve.compiled import cellwise_space
 from epsmesh.solve.physics import MaterialLaw
-from epsmesh.solve.points.reduce import CHANGES, change_of
+from epsmesh.solve.points.reduce import change_of
 from epsmesh.solve.points.state import Values
 from epsmesh.study.capabilities.refusals import refused
 from epsmesh.study.case import Case
@@ -186,9 +186,9 @@ class CaseSolution:
             return {}
         above = finer.at(points)
         bars = {} if finer.influence is None else {"influence": self._bar_of_influence(points)}
-        known = np.where(self.solved.state.of_cells_at(points, clear.astype(float)) == 1.0, CHANGES, np.nan)
+        known = np.where(self.solved.state.of_cells_at(points, clear.astype(float)) == 1.0, fitted.CHANGES, np.nan)
         return bars | {
-            "displacement": CHANGES * change_of("displacement", values, above),
+            "displacement": fitted.CHANGES * change_of("displacement", values, above),
             "principal_stress": known * change_of("max_principal", values, above),
             "von_mises": known * change_of("von_mises", values, above),
         }
@@ -196,7 +196,7 @@ class CaseSolution:
     def _bar_of_influence(self, points: FloatArray) -> FloatArray:
         state, finer = self.solved.state, self.solved.finer
         assert finer is not None and state.influence is not None and finer.influence is not None
-        return state.of_cells_at(points, CHANGES * np.abs(finer.influence.young - state.influence.young))
+        return state.of_cells_at(points, fitted.CHANGES * np.abs(finer.influence.young - state.influence.young))
 
     def _corners(self) -> FloatArray:
         """Return the corners (8, 3) of the box of the whole mesh; collective."""

@@ -9,7 +9,7 @@ import basix
 import numpy as np
 from mpi4py import MPI
 
-from epsmesh import compat
+from epsmesh import compat, fitted
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.steps import Solve
@@ -17,7 +17,6 @@ from epsmesh.run.spread import logarithm_of
 from epsmesh.shapes.contact import place_of_touch
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.points.locate import table_of
-from epsmesh.solve.points.reduce import CHANGES
 from epsmesh.solve.points.state import State
 from epsmesh.study.case import Case
 from epsmesh.study.influence import DECIDED
@@ -26,11 +25,6 @@ from epsmesh.study.influence import DECIDED
 _QUADRATURE, _CHUNK = 6, 20_000
 # Distances at which sums are read, from the least on, in units of the largest; they are interpolated between.
 _LEAST, _DISTANCES = 1e-4, 2_000
-# The exponent of the distance in the density of energy that a point force leaves.
-_DECAY = -4
-# Least change of a region's share, in units of what changes anywhere in it; of its effect of ν, which may vanish by
-# chance, in units of the bars of all regions times its share: without, 2 of 32 values were outside, by up to 1.6 times.
-_POINTWISE = 0.1
 # A sum of the influence that lacks no more than this is the whole force.
 _ROUNDING = 1e-6
 
@@ -69,7 +63,7 @@ def sums_of_influence(
             regions[number] += [np.bincount(numbers[cells], one, minlength=count) for one in parts]
         here, finest = (one.young[cells, None] * volumes for one in (state.influence, above))
         middles, whole = distances.mean(axis=1), here.sum(axis=1)
-        steep = here * distances**_DECAY
+        steep = here * distances**fitted.DECAY
         steep *= np.divide(whole, steep.sum(axis=1), out=np.zeros_like(whole), where=whole > 0)[:, None]
         # By distance: here, in one degree more, with each cell at one distance, and with a decay within each cell.
         within[:2] += [by_distance(distances, one) for one in (here, finest)]
@@ -79,7 +73,7 @@ def sums_of_influence(
     share, of_poisson = regions[0, 0], _bar_of_sums(*regions[1])
     found = {
         "force_share": (share, _bar_of_sums(*regions[0]) + contact_error * np.abs(share * (1 - share))),
-        "poisson_effect": (regions[1, 0], of_poisson + _POINTWISE * np.abs(share) * of_poisson.sum()),
+        "poisson_effect": (regions[1, 0], of_poisson + fitted.POINTWISE_INFLUENCE * np.abs(share) * of_poisson.sum()),
         "influence_radius": (radii[0], _bar_of_radii(*radii)),
     }
     is_known = above is not state.influence
@@ -104,7 +98,7 @@ def _farthest(body: BodyMesh, centre: FloatArray) -> float:
 
 
 def _bar_of_sums(here: FloatArray, above: FloatArray, changed: FloatArray) -> FloatArray:
-    return CHANGES * np.maximum(np.abs(here - above), _POINTWISE * changed)
+    return fitted.CHANGES * np.maximum(np.abs(here - above), fitted.POINTWISE_INFLUENCE * changed)
 
 
 def _bar_of_radii(here: FloatArray, above: FloatArray, by_cell: FloatArray, steep: FloatArray) -> FloatArray:
@@ -114,7 +108,7 @@ def _bar_of_radii(here: FloatArray, above: FloatArray, by_cell: FloatArray, stee
     """
     changes = [np.abs(other / here - 1) for other in (above, by_cell, steep)]
     of_degree, *of_size = (np.maximum(change, np.sqrt(np.nanmean(change**2))) for change in changes)
-    return np.asarray(here * (CHANGES * of_degree + np.maximum(*of_size)))
+    return np.asarray(here * (fitted.CHANGES * of_degree + np.maximum(*of_size)))
 
 
 def _points(state: State, centre: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import BoolArray
 from epsmesh.plan.steps import Solve
 from epsmesh.run.case_solution import CaseSolution
@@ -22,15 +23,13 @@ from epsmesh.run.record import Record
 from epsmesh.run.solved import Solved, compile_law, put_back
 from epsmesh.solve import SolveError
 from epsmesh.solve.cell_values import clear_cells
-from epsmesh.solve.points.reduce import CHANGES, Number, at_point, over_region
+from epsmesh.solve.points.reduce import Number, at_point, over_region
 from epsmesh.solve.points.state import State
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Case
 from epsmesh.study.output import OWN, WHOLE, Output
 
-# Least change, in units of the mean pointwise change over the region.
-POINTWISE = {"at": 1.0, "max": 0.5, "mean": 0.1, "quantile": 0.3}
 # The highest degree for which the whole case is solved again in one degree more.
 _HIGHEST = 2
 
@@ -128,7 +127,7 @@ def _bar(output: Output, number: Number) -> float:
     if number.is_singular or number.is_outside:
         return nan
     kind = "at" if output.at is not None else output.reduction if output.reduction in ("max", "mean") else "quantile"
-    return CHANGES * max(number.change, POINTWISE[str(kind)] * number.pointwise)
+    return fitted.CHANGES * max(number.change, fitted.POINTWISE[str(kind)] * number.pointwise)
 
 
 def _notes(output: Output, number: Number | str) -> list[str]:

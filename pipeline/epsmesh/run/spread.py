@@ -20,11 +20,10 @@ from math import gamma, hypot, nan, sqrt
 import numpy as np
 from mpi4py import MPI
 
-from epsmesh import compat
+from epsmesh import compat, fitted
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.shapes.tissue import Spread
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.points.reduce import CHANGES
 from epsmesh.solve.points.state import State
 from epsmesh.solve.variation import places
 
@@ -34,12 +33,6 @@ _SHAPE, _ENDS, _STEPS = 1.5, (-7.0, 3.0), 14
 # Boxes are halved until their size is this share of the correlation length, or until the share of F in them times the
 # square of their size in correlation lengths is below the tolerance.
 _FINEST, _TOLERANCE, _HALVINGS = 0.2, 5e-4, 20
-# Least change of the double integral by one degree more, in units of what it were if all shares changed to one side.
-_POINTWISE = 0.1
-# Mean of ln F above that to first order, as a share of the variance that is averaged out, and what is left of it. What
-# the first order leaves of the deviation of ln F, relative, as a share of the variance of ln E. They are of twelve
-# scenes with sampled fields; benchmarks/spread.py judges them on others.
-_HELD, _OF_HELD, _OF_DEVIATION = 0.09, 0.15, 0.25
 # Clusters whose distances to all others are computed at once; cells whose extents are.
 _ROWS, _CHUNK = 256, 20_000
 
@@ -96,15 +89,16 @@ def logarithm_of(
             clusters = sources.gathered(_clusters(sources, length))
             sums = square * _integral(comm, clusters, length, mirrored)
             variance += float(sums[0, 0])
-            change += max(abs(float(sums[1, 1] - sums[0, 0])), _POINTWISE * 2 * float(sums[0, 2]))
+            change += max(abs(float(sums[1, 1] - sums[0, 0])), fitted.POINTWISE_SPREAD * 2 * float(sums[0, 2]))
             unresolved += square * _own(sources, length) * 2.0 ** len(mirrored)
             given += square * float(sources.shares[:, 0].sum()) * 2.0 ** len(mirrored)
     deviation, averaged = sqrt(max(variance, 0.0)), max(given - variance, 0.0)
     error = nan
     if finer is not None and finer.influence is not None and deviation > 0:
-        of_mesh = (CHANGES * change + unresolved) / (2 * deviation) + contact_error * deviation * averaged / given
-        error = hypot(of_mesh, _OF_DEVIATION * given * deviation)
-    return Logarithm(_HELD * averaged - given / 2, _OF_HELD * averaged, deviation, error)
+        of_mesh = (fitted.CHANGES * change + unresolved) / (2 * deviation)
+        of_mesh += contact_error * deviation * averaged / given
+        error = hypot(of_mesh, fitted.SPREAD_DEVIATION * given * deviation)
+    return Logarithm(fitted.SPREAD_HELD * averaged - given / 2, fitted.SPREAD_LEFT * averaged, deviation, error)
 
 
 def _own(sources: Sources, length: float) -> float:

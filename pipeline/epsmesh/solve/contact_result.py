@@ -4,12 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import nan, pi
 
+from epsmesh import fitted
 from epsmesh.shapes.section import in_mm
-
-# Bars with friction, in units of the change from half as many load steps, to which the area that slides adds a part of
-# the facets in which sliding begins or ends, and the tangential force the relative bars on the axial one and on the
-# contact area, and a part of what nodal forces have beyond it. Measured: benchmarks/results/friction.md.
-_OF_STEPS, _OF_UNSURE, _OF_FORCE, _OF_AREA, OF_UNEVEN = 1.5, 0.6, 2.0, 3.0, 0.3
 
 # Contact radii by which loads may move the place of contact without a word.
 _MOVED = 0.5
@@ -99,6 +95,6 @@ class Rubbing:
 
         ``area`` (m²) is that of the contact, ``area_bar`` its relative bar, and ``relative`` that of the axial force.
         """
-        of_slip = (_OF_STEPS * self.change_of_share + area_bar * self.share) * area + _OF_UNSURE * self.unsure
-        of_force = _OF_STEPS * self.change_of_force + (_OF_FORCE * relative + _OF_AREA * area_bar) * self.force
-        return of_slip, of_force + OF_UNEVEN * self.uneven
+        steps, share = fitted.RUBBING_STEPS, fitted.RUBBING_FORCE * relative + fitted.RUBBING_AREA * area_bar
+        of_slip = (steps * self.change_of_share + area_bar * self.share) * area + fitted.RUBBING_UNSURE * self.unsure
+        return of_slip, steps * self.change_of_force + share * self.force + fitted.RUBBING_UNEVEN * self.uneven

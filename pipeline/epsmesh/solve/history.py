@@ -6,10 +6,8 @@ from math import inf, nan
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray, IntArray
-
-# The bar of the steps with friction, in units of the change from half as many.
-_OF_HALF = 1.5
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ class History:
 
         With friction, whose law is that of the end of a step, an error is about as large as that change.
         """
-        change = _OF_HALF * np.abs(self.forces[numbers, 2] - coarse.forces[:, 2])
+        change = fitted.STEPS_FRICTION * np.abs(self.forces[numbers, 2] - coarse.forces[:, 2])
         more = between(dict(zip(numbers, change.tolist(), strict=True)), len(self.times))
         return replace(self, bars=self.bars + more)
 

@@ -19,15 +19,13 @@ from math import nan
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import extrapolate
 from epsmesh.solve.movement import Movement, Vector
 
-# Bar on the loads' effect on the probe, in units of the geometric mean of both bars: factor of the cosine, and rest.
-# Measured: benchmarks/results/friction.md.
-_SEEN, _UNSEEN = {"displacement": 1.15, "mixed": 1.25}, {"displacement": 0.12, "mixed": 0.2}
 # Directions are equal within this distance.
 _SAME = 1e-9
 
@@ -172,7 +170,7 @@ def load_bars(bars: FloatArray, decrements: FloatArray, element: str) -> FloatAr
     root = np.sqrt(diagonal[:-1] * diagonal[-1])
     cosine = np.divide(np.abs(decrements[:-1, -1]), root, out=np.ones_like(root), where=root > 0)
     found = bars.copy()
-    found[:-1, -1] *= np.minimum(1.0, _SEEN[element] * cosine + _UNSEEN[element])
+    found[:-1, -1] *= np.minimum(1.0, fitted.LOADS_SEEN[element] * cosine + fitted.LOADS_UNSEEN[element])
     found[-1, :-1] = found[:-1, -1]
     return found
 

@@ -18,6 +18,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.balance import sums
 from epsmesh.solve.compiled import global_sum
@@ -40,8 +41,6 @@ from epsmesh.stages import stage
 _FEWEST, _FEWEST_WITH_FRICTION = 3, 8
 # How often all steps are halved for an accuracy.
 _MOST_REFINEMENTS = 3
-# Of the difference between steps and double steps, a third is the error of the steps; the bar is twice that.
-_OF_DIFFERENCE = 2 / 3
 
 
 @dataclass
@@ -272,7 +271,7 @@ class TimeSteps:
         return History(
             times=np.array(course.times),
             forces=np.array(forces),
-            bars=_OF_DIFFERENCE * whole * between(errors, len(forces)) + np.maximum.accumulate(rough),
+            bars=fitted.STEPS * whole * between(errors, len(forces)) + np.maximum.accumulate(rough),
             dissipated=whole * np.array(heat),
             imbalance=whole * np.array(imbalance),
             areas=np.array(areas),

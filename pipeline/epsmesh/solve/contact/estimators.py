@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import Int32Array
 from epsmesh.solve.compiled import vector
 from epsmesh.solve.contact.active_set import Obstacle, SettledContact, find_set
@@ -23,8 +24,6 @@ from epsmesh.solve.elements.mixed import MixedSolver
 from epsmesh.solve.hierarchical_estimate import energy_decrements
 from epsmesh.solve.linear_solver import LinearSolver
 
-# The bar on what friction adds to the force, as a share of it: benchmarks/results/friction.md.
-_OF_FRICTION = 0.2
 # Relative energy norm of the error of the next degree's solution, with the area fixed.
 _TOLERANCE = 0.1
 # Tolerances for contact that is found again in the next degree: loose first.
@@ -61,7 +60,7 @@ def half_the_steps(found: HierarchicalEstimate, contact: SurfaceContact, without
     assert found.decrements is not None
     assert contact.coarse is not None
     force, at_edge = contact.force, contact.area.bar
-    of_friction = abs(force_of(contact.coarse) / force - 1) + _OF_FRICTION * abs(force / without - 1)
+    of_friction = abs(force_of(contact.coarse) / force - 1) + fitted.FRICTION * abs(force / without - 1)
     return replace(
         found,
         decrements=found.decrements * (force / without),

@@ -14,6 +14,7 @@ from math import nan
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.cell_values import plain_share
 from epsmesh.solve.compiled import global_sum
@@ -33,8 +34,6 @@ from epsmesh.solve.response import Response, reaction
 
 # Bounds that differ by at most this share of the depth are equal.
 _SAME = 1e-9
-# Contact is solved again for the bar where fully active facets cover less than this share of its area.
-_COVERED = 0.3
 # Energy norm of the error of the rate by the depth, relative to that of the solution.
 _RATE = 1e-8
 
@@ -192,7 +191,7 @@ class LinearContact:
         candidates, found, elements = self.obstacle.candidates, self.smooth, self.sweep.elements
         touching, area_bar = float(candidates.weights[found.active].sum()), self.surface.area.bar
         covered = float(candidates.areas[candidates.closed(found.active)].sum())
-        if covered < _COVERED * touching:
+        if covered < fitted.FOUND_COVERED * touching:
             return found_again_bar(found_again(elements, self.obstacle_above(), found), area_bar)
         removed, unseen = area_fixed(elements, candidates.held_facets(found.active))
         share, unseen = removed / found.state.energy, unseen / found.state.energy

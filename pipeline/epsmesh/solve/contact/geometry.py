@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.elements import FreeResponse
@@ -98,9 +99,6 @@ _WIDTH = 1.3
 _SEMI_AXIS = 5**0.5
 # Fixed-point iteration for K and the area, which depend on each other: most rounds, and the change at which it ends.
 _MOST_ROUNDS, _SMALL = 60, 1e-9
-# The 95 % bar on the area, in units of the area of nodes that share a facet with the contact's edge:
-# benchmarks/results/coverage.md.
-_BAR = 0.07
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,7 @@ def contact_area(
         if abs(found - area) <= _SMALL * area:
             break
         area = (area + found) / 2
-    return Area(area, _BAR * float(weights[near].sum()) / area)
+    return Area(area, fitted.AREA * float(weights[near].sum()) / area)
 
 
 def _semi_axis(points: FloatArray, load: FloatArray, mirrored: tuple[int, ...]) -> float:

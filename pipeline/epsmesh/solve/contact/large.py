@@ -19,6 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
@@ -44,7 +45,7 @@ from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.ended import ended
-from epsmesh.solve.estimate import AT_EDGE_LARGE, found_again_bar
+from epsmesh.solve.estimate import found_again_bar
 from epsmesh.solve.movement import Loads, Movement
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.response import Response, reaction
@@ -255,7 +256,7 @@ class LargeContactSolution:
             return half_the_steps(found, self.surface_contact, smooth.force)
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         share, at_edge = 1 - finer.force / self.force, here.area.bar
-        least = AT_EDGE_LARGE[self.body.elements.degree]
+        least = fitted.AT_EDGE_LARGE[self.body.elements.degree]
         decrement, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.

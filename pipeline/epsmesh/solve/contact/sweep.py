@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import BoolArray
 from epsmesh.solve.contact.active_set import Obstacle, SettledContact, find_set
 from epsmesh.solve.contact.elements import ContactElements, SurfaceState, Unknowns
@@ -14,8 +15,6 @@ from epsmesh.stages import Times
 
 # Error bars are shared between two depths that differ by at most this factor.
 NEAR = 2.0
-# A depth between them gets the larger bar times this factor: contact gains whole nodes, and bars jump with them.
-_SAFE = 1.25
 # Number of remembered depths: in an ordered sweep the last ones are the nearest.
 _REMEMBERED = 2
 # Two depths are extrapolated to a third at most this many times their own distance away.
@@ -121,5 +120,5 @@ class Sweep:
         if ends[1] > NEAR * ends[0]:
             return None
         decrement, share = max((bars[end] for end in ends), key=lambda pair: pair[1])
-        factor = _SAFE if ends[0] < ends[1] else 1.0
+        factor = fitted.BETWEEN_DEPTHS if ends[0] < ends[1] else 1.0
         return factor * decrement, factor * share

@@ -18,6 +18,7 @@ from math import exp, inf, log, pi
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
@@ -32,8 +33,6 @@ from epsmesh.stages import stage
 
 # Tolerance on the depth of a trial radius (F errs by its square), and most trials.
 _NEAR, _MOST_TRIALS = 3e-4, 12
-# Bar on the area, in units of the relative error of a radius; its correction is known to a part of itself.
-_OF_RADIUS = 2.0
 # Largest contact radius, as a share of the modelled body's: beyond it contact has no edge.
 _WIDEST = 0.999
 # Nodes along the radius for the search for rings that lift off, and between two of them the second time.
@@ -173,7 +172,7 @@ class _Search:
             misses = [log(punch.depth / depth) for punch in (coarse, fine)]
             error += max(np.square(misses)) * fine.stiffness * depth / force / patch.power
             radius *= exp(-misses[1] / patch.power)
-            of_area += _OF_RADIUS * max(abs(misses[0] - misses[1]), abs(misses[1])) / patch.power
+            of_area += fitted.MERIDIAN_RADIUS * max(abs(misses[0] - misses[1]), abs(misses[1])) / patch.power
         error += patch.off**2 * fine.stiffness * depth / force
         with stage("solve"):
             solution = depth * fine.punch + fine.pressed

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.meridian import JOINT, RegionMesh
 from epsmesh.solve import SolveError
@@ -20,8 +21,6 @@ from epsmesh.solve.point_law import SYMMETRIC
 
 # Two places are equal within this share of the larger coordinate (rounding).
 _SAME_PLACE = 1e-11
-# The change that more points of quadrature make is a part of that of exact integrals, across a kink about a half.
-_OF_FIELDS = 3.0
 
 # By region number.
 Meshes = dict[int, RegionMesh]
@@ -100,7 +99,7 @@ class MeridianForms:
         F is stationary: to first order, it changes as the energy of the ``solution``.
         """
         change = sum(part.unresolved(solution[number]) for part, number in self._parts)
-        return _OF_FIELDS * abs(change) / self.energy(solution) if change else 0.0
+        return fitted.MERIDIAN_FIELDS * abs(change) / self.energy(solution) if change else 0.0
 
     def impose(self, factors: Sequence[float], stress: Sequence[FloatArray] | None) -> None:
         """Change the energy of relaxing tissue: ``factors`` of regions, and ``stress`` as of :meth:`stresses`, or 0."""

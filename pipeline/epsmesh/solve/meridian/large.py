@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.meridian import Grading, MeridianArrays
 from epsmesh.solve import SolveError
@@ -43,8 +44,6 @@ _LEFT, _MOST_ITERATIONS, _HALVINGS = 1e-9, 14, 6
 _FEWEST = 3
 # Steps of a mesh after the first, which must reach the depth with ease, are halved once at most.
 _SHORTEST_OF_FINER = 1 / 7
-# The bar is this many times the difference from the mesh before; or, for the first mesh, that of the degrees.
-_BETWEEN_MESHES, _FIRST_MESH = 2.0, 2.5
 # Largest error bar of a result.
 _WORST_ERROR = 2e-2
 _ROUNDING = 1e-13
@@ -198,9 +197,9 @@ class LargeMeridian(LargeSolver):
         )
         error += fine.forms.unresolved(state)
         if before is None:
-            error *= _FIRST_MESH
+            error *= fitted.MERIDIAN_FIRST
         else:
-            error = max(error, _BETWEEN_MESHES * abs(before.on_probe * deep / on_probe - 1))
+            error = max(error, fitted.MERIDIAN_MESHES * abs(before.on_probe * deep / on_probe - 1))
         return Answer(
             stiffness=-on_probe / deep,
             on_probe=on_probe / deep,

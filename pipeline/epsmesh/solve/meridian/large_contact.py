@@ -18,13 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
 from epsmesh.solve.contact.checks import check_support
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.contact.in_time import ContactIndentation
-from epsmesh.solve.contact_result import OF_UNEVEN, ContactResult
+from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.large import LargeSolver, stopped
 from epsmesh.solve.meridian.problem import Answer
@@ -34,14 +35,6 @@ from epsmesh.solve.meridian.touch import MeridianTouch
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
 
-# Bar: these multiples of the differences of the degrees, on one mesh, and of two meshes, and the square of the distance
-# of nodes at the edge.
-_BETWEEN_DEGREES, _BETWEEN_MESHES = 2.0, 1.0
-# The same for each result in units of those of F: F itself, friction, the contact area and the part that slides; and
-# the area in units of the distance of nodes at the edge. F is stationary with respect to the area, which errs by more.
-_OF_RESULTS, _OF_EDGE = np.array([1.0, 1.5, 0.5, 1.0]), 0.3
-# Largest change of the friction, as a share of it, that enters its bar.
-_MOST = 0.9
 # With friction: load steps of each mesh, whose bar is rarely below a tenth of a per cent, the accuracy that is tried,
 # and a degree whose error is well below that of the steps.
 _STEPS = {Grading(0.1, 1.0, 4.0): 8, Grading(0.02, 0.7, 4.0): 16}
@@ -92,7 +85,7 @@ class LargeMeridianContact(LargeSolver):
             raise stopped(stop, arrays, law, depth, is_found=True, friction=self._tool.friction) from stop
         fine.check()
         deep, force, balance = depth / arrays.unit, fine.force, fine.balance
-        error = float(_OF_RESULTS[0] * bars[0]) / fine.results[0] + fine.resolution**2 + 3 * balance
+        error = float(fitted.MERIDIAN_RESULTS[0] * bars[0]) / fine.results[0] + fine.resolution**2 + 3 * balance
         error += fine.tissue.system.forms.unresolved(fine.tissue.state)
         return _ContactAnswer(
             stiffness=force / deep,
@@ -113,13 +106,13 @@ class LargeMeridianContact(LargeSolver):
     def _contact(self, fine: MeridianTouch, bars: FloatArray, error: float) -> ContactResult:
         """Return the contact with ``bars`` on its results (4,); ``error`` is the relative bar of the force."""
         _, friction, area, slip_area = fine.results.tolist()
-        _, of_friction, of_area, of_slip = (_OF_RESULTS * bars).tolist()
-        found = ContactResult(area, of_area / area + _OF_EDGE * fine.resolution)
+        _, of_friction, of_area, of_slip = (np.array(fitted.MERIDIAN_RESULTS) * bars).tolist()
+        found = ContactResult(area, of_area / area + fitted.MERIDIAN_EDGE * fine.resolution)
         if not self._tool.friction:
             return found
         # Too few steps make friction too large, which then errs by more than by its share of itself.
-        of_friction /= 1 - min(of_friction / max(friction, of_friction), _MOST) if of_friction else 1.0
-        of_friction += OF_UNEVEN * fine.uneven * fine.unit**2
+        of_friction /= 1 - min(of_friction / max(friction, of_friction), fitted.MOST) if of_friction else 1.0
+        of_friction += fitted.RUBBING_UNEVEN * fine.uneven * fine.unit**2
         # Sliding may begin between the last two nodes. Tissue that sticks by definition does not slide.
         of_slip += fine.slip_resolution * fine.unit**2 + fine.resolution * area
         return replace(
@@ -145,7 +138,7 @@ class LargeMeridianContact(LargeSolver):
             fine = at(self._degree).moved(before, depth)
         except LargeError:
             return None
-        return fine, _BETWEEN_MESHES * np.abs(before.results - fine.results)
+        return fine, fitted.MERIDIAN_FOUND_MESHES * np.abs(before.results - fine.results)
 
     def _along_path(
         self, at: Callable[[int], MeridianTouch], depth: float, steps: int
@@ -168,7 +161,7 @@ class LargeMeridianContact(LargeSolver):
                 fine = fine.raised(coarse, depth)
             except LargeError:  # its own path tells how far it comes
                 fine = fine.at_depth(depth)
-        return fine, bars + _BETWEEN_DEGREES * np.abs(coarse.results - fine.results)
+        return fine, bars + fitted.MERIDIAN_FOUND_DEGREES * np.abs(coarse.results - fine.results)
 
 
 class RoundToolIndentation(ContactIndentation):

@@ -8,6 +8,7 @@ ahead of its tip, which its shaft wedges open: e = s + 2b Γ, the least over the
 from collections.abc import Sequence
 from math import nan
 
+from epsmesh import fitted
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.contact_result import ContactResult
@@ -16,9 +17,6 @@ from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.plane.crack import LEVELS, open_crack
 from epsmesh.solve.plane.cut import Cut, Cuts
 from epsmesh.solve.plane.opening import Opening
-
-# Two meshes may have the same results by chance: round-off errs by less than this many times the balance.
-_ROUND_OFF = 3.0
 
 
 class NeedleSolver(MeridianSolver):
@@ -43,7 +41,7 @@ class NeedleSolver(MeridianSolver):
         """
         coarse, fine = self._cuts(law, self._toughness / (law.lame_mu[0] * self._radius))
         check_balance(max(coarse.balance, fine.balance))
-        round_off = _ROUND_OFF * fine.balance
+        round_off = fitted.NEEDLE_ROUND_OFF * fine.balance
         error, touched = max(_differences(coarse[:3], fine[:3])) + round_off, fine.touched * self._radius * depth
         of_touched = _differences(coarse[3:4], fine[3:4])[0] + round_off
         # Per length, forces are in units of μ R, energies of μ R².

@@ -39,8 +39,6 @@ _NUMBERS: dict[str, Callable[[Values], FloatArray]] = {
     "pressure": lambda v: np.asarray(-np.trace(v.stress, axis1=1, axis2=2) / 3),
     "max_strain": lambda v: _principal_norm(v.strain),
 }
-# 95 % bar, in units of the change by one degree more.
-CHANGES = 2.0
 # Those that do not grow without bound at a singular edge.
 _BOUNDED = ("displacement", "displacement_x", "displacement_y", "displacement_z")
 
