@@ -15,6 +15,7 @@ SOAK_ARGS ?=
 SAME_ARGS ?= --seeds 0:300
 STRESS_ARGS ?=
 COVERAGE_ARGS ?=
+REFIT_ARGS ?=
 FAULTS_ARGS ?=
 MUTANTS_ARGS ?=
 
@@ -42,7 +43,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored stress extremes coverage pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers plain-loop realtime wasm vendored stress extremes coverage refit pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -149,6 +150,9 @@ extremes: setup ## extreme values in random scenes, against finer solutions (hou
 
 coverage: setup ## how often error bars cover the error, on 1,000 random scenes of every feature (hours; COVERAGE_ARGS="--minutes 10", then again)
 	$(MPI_ENV) $(PYTHON) -m benchmarks.bars $(COVERAGE_ARGS)
+
+refit: setup ## what random scenes say of each constant of error bars (an hour in parts of 9 minutes; REFIT_ARGS="--seeds 0:120")
+	$(MPI_ENV) nice $(PYTHON) -m benchmarks.refit $(REFIT_ARGS)
 
 fuzz: setup ## random study files, damaged surfaces, datasets, stores and models (minutes)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)

@@ -18,11 +18,12 @@ import tempfile
 import time
 import tomllib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.stats import binomtest
@@ -54,11 +55,19 @@ Values = dict[str, float]
 Drawn = Callable[[int, Path], tuple[Study, dict[str, str]]]
 
 
+class Look(AbstractContextManager[Any], Protocol):
+    """What follows a scene's solve, and then reads off its results and those of its truth what is wanted of them."""
+
+    def read(self, found: Outcome, truth: Outcome) -> dict[str, Any]:
+        """Return what a row keeps as ``raw``: what JSON can write."""
+
+
 @dataclass(frozen=True)
 class Row:
     """A scene: its classes, the relative bar of F, and of each quantity its error, in bars, and its truth's own bar.
 
-    ``result`` is "judged", or why it is not: what became of the scene, or of its truth.
+    ``result`` is "judged", or why it is not: what became of the scene, or of its truth. ``raw`` is what a caller reads
+    off both.
     """
 
     seed: int
@@ -68,6 +77,7 @@ class Row:
     errors: dict[str, float] = field(default_factory=dict)
     truths: dict[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    raw: dict[str, Any] = field(default_factory=dict)
 
     @property
     def main(self) -> str:
@@ -131,24 +141,38 @@ def truths(study: Study, bar: float) -> Iterator[Study]:
             yield study | {"mesh": mesh | sizes | {"growth": 0.5, "degree": degree}}
 
 
-def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
-    """Solve a scene and its truth, and compare; a process that needs too long is ended by the system."""
+def judged(
+    seed: int,
+    folder: Path,
+    drawn: Drawn = scene,
+    finer_than: Callable[[Study, float], Iterable[Study]] = truths,
+    look: Look | None = None,
+    longest: float = _LONG,
+) -> Row:
+    """Solve a scene and its truth, and compare; a process that needs too long is ended by the system.
+
+    Studies ``finer_than`` it, for its relative bar, are tried as its truth if they take at most the ``longest`` time
+    (s), as planned. ``look`` follows the scene's solve.
+    """
     start = time.process_time()
     _, most = resource.getrlimit(resource.RLIMIT_CPU)
     resource.setrlimit(resource.RLIMIT_CPU, (int(start) + _LIMIT, most))
     study, classes = drawn(seed, folder)
-    found = solve(copy.deepcopy(study), folder)
+    with look or nullcontext():
+        found = solve(copy.deepcopy(study), folder)
 
-    def row(result: str, bar: float = math.nan, errors: Values | None = None, known: Values | None = None) -> Row:
-        return Row(seed, result, classes, bar, errors or {}, known or {}, time.process_time() - start)
+    def row(
+        result: str, bar: float = math.nan, errors: Values | None = None, known: Values | None = None, **raw: Any
+    ) -> Row:
+        return Row(seed, result, classes, bar, errors or {}, known or {}, time.process_time() - start, raw)
 
     if not found.is_taken:
         return row(f"{found.kind}: {' '.join(found.message.split())[:300]}")
     name = "depth" if "force" in study["probe"] else "force"
     bars = _relative(found, name)
     reason = "its truth takes too long"
-    for finer in truths(study, bars):
-        if seconds(finer, folder) > _LONG:
+    for finer in finer_than(study, bars):
+        if seconds(finer, folder) > longest:
             continue
         truth = solve(copy.deepcopy(finer), folder)
         if not truth.is_taken:
@@ -156,7 +180,7 @@ def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
             continue
         errors, known = compared(found, truth)
         if known.get(name, math.inf) <= _KNOWN:
-            return row("judged", bars, errors, known)
+            return row("judged", bars, errors, known, **(look.read(found, truth) if look else {}))
         reason = "its truth is not known well enough"
     return row(reason, bars)
 
@@ -236,16 +260,38 @@ def run(
     limit: float = math.inf,
     told: Callable[[Row], None] = lambda row: None,
     drawn: Drawn = scene,
+    judge: Callable[[int, Path, Drawn], Row] = judged,
 ) -> list[Row]:
     """Judge the scenes of some seeds, until ``limit`` (s) is over; a scene that ends its process is a row, too."""
     end, rows = time.monotonic() + limit, []
     with tempfile.TemporaryDirectory() as folder:
         write_files(Path(folder))
         timely = itertools.takewhile(lambda _: time.monotonic() < end, seeds)
-        for (seed, *_), found in isolated(judged, ((seed, Path(folder), drawn) for seed in timely)):
+        for (seed, *_), found in isolated(judge, ((seed, Path(folder), drawn) for seed in timely)):
             rows.append(found if isinstance(found, Row) else Row(seed, "took too long"))
             told(rows[-1])
     return rows
+
+
+def resumed(
+    log: Path,
+    seeds: Collection[int],
+    limit: float,
+    drawn: Drawn = scene,
+    judge: Callable[[int, Path, Drawn], Row] = judged,
+) -> list[Row]:
+    """Return the rows of some seeds in a ``log``, after judging those it lacks for at most ``limit`` (s)."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    rows = [Row(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
+    done = {row.seed for row in rows}
+    with log.open("a", encoding="utf-8") as file:
+
+        def note(row: Row) -> None:
+            print(json.dumps(asdict(row), ensure_ascii=False), file=file, flush=True)
+            print(row.seed, ", ".join(row.classes.values()), row.result, _words(row), flush=True)
+
+        rows += run((seed for seed in seeds if seed not in done), limit, note, drawn, judge)
+    return [row for row in rows if row.seed in seeds]
 
 
 def campaign(
@@ -262,18 +308,8 @@ def campaign(
     asked = parser.parse_args(arguments)
     first, end = map(int, asked.seeds.split(":"))
     kind = next((name for name, (low, high) in SEEDS.items() if low <= first < end <= high), "sealed")
-    asked.output.mkdir(parents=True, exist_ok=True)
     log = asked.output / f"{name}-{kind}.jsonl"
-    rows = [Row(**json.loads(line)) for line in log.read_text().splitlines()] if log.exists() else []
-    done = {row.seed for row in rows}
-    with log.open("a", encoding="utf-8") as file:
-
-        def note(row: Row) -> None:
-            print(json.dumps(asdict(row), ensure_ascii=False), file=file, flush=True)
-            print(row.seed, ", ".join(row.classes.values()), row.result, _words(row), flush=True)
-
-        rows += run((seed for seed in range(first, end) if seed not in done), 60 * asked.minutes, note, drawn)
-    rows = [row for row in rows if first <= row.seed < end]
+    rows = resumed(log, range(first, end), 60 * asked.minutes, drawn)
     text = told(rows)
     write(name if kind == "test" else f"{name}-{kind}", asked.output, [asdict(row) for row in rows], text)
     print(text)

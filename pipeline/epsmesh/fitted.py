@@ -60,8 +60,8 @@ LIMITS_FINE: Annotated[_Ranges, Fit("θ s", _ASKED, "2026-11-26")] = {
 }
 # For mixed elements the spread is at least this many times N - |s|, by degree. Two errors of opposite sign may cancel
 # in s, while N contains both. Where limits are those of small elements, N counts from so many |s| on.
-APART: Annotated[dict[int, float], Fit("θ (N - |s|)", _COVERAGE, "2026-11-26")] = {2: 0.3, 3: 0.15}
-APART_FINE: Annotated[float, Fit("|s|", _ASKED, "2026-11-26")] = 1.3
+APART: Annotated[dict[int, float], Fit("θ (N - size of s)", _COVERAGE, "2026-11-26")] = {2: 0.3, 3: 0.15}
+APART_FINE: Annotated[float, Fit("size of s", _ASKED, "2026-11-26")] = 1.3
 # The same at large displacements, where contact is bonded and one degree more was solved.
 LIMITS_SOLVED: Annotated[Range, Fit("θ s", _DEEP, "2026-11-26")] = (0.9, 0.6)
 # Interfaces between materials, curved surfaces and thin plates add errors. The next degree removes another share of
