@@ -16,8 +16,8 @@ from epsmesh.shapes.rounded import Rounded
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import compiling
 from epsmesh.solve.conditions import Conditions
-from epsmesh.solve.meridian.contact import DEGREE, MeridianContact
-from epsmesh.solve.meridian.problem import MeridianProblem, compile_axisymmetric
+from epsmesh.solve.meridian.contact import MeridianContact
+from epsmesh.solve.meridian.problem import DEGREE, MeridianProblem, compile_axisymmetric
 from epsmesh.solve.meridian.punch import TRIAL_DEGREE, RoundTool
 from epsmesh.solve.meridian.signs import LiftsOff, check_signs
 from epsmesh.solve.movement import Movement

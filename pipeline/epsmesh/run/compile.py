@@ -16,7 +16,7 @@ from epsmesh.solve.greens_function import compile_regular
 from epsmesh.solve.kernels import native
 from epsmesh.solve.meridian.large import DEGREE as LARGE_DEGREE
 from epsmesh.solve.meridian.large_contact import DEGREE_OF_STEPS
-from epsmesh.solve.meridian.problem import DEGREE, compile_axisymmetric
+from epsmesh.solve.meridian.problem import DEGREE, compile_axisymmetric, how_for
 from epsmesh.solve.meridian.punch import TRIAL_DEGREE
 from epsmesh.stages import stage
 from epsmesh.study.way import LINEAR, Constraint, Motion
@@ -125,4 +125,5 @@ def _forms(solve: Solve) -> _Forms:
     if way.is_large or way.in_time:
         degree = DEGREE_OF_STEPS if way.rubs else LARGE_DEGREE
         return _Meridian(curved, degree, laws=way.laws, relaxes=way.in_time, varies=case.varies)
-    return _Meridian(curved, lowest=_LOWEST.get(way.constraint, 0), varies=case.varies)
+    degree = how_for(solve.goal).get("degree", DEGREE)
+    return _Meridian(curved, degree, lowest=_LOWEST.get(way.constraint, 0), varies=case.varies)

@@ -31,7 +31,7 @@ from epsmesh.solve.krylov import DIRECT_LIMIT, is_direct
 from epsmesh.solve.meridian.contact import MeridianContact
 from epsmesh.solve.meridian.large import LargeMeridian
 from epsmesh.solve.meridian.large_contact import LargeMeridianContact
-from epsmesh.solve.meridian.problem import MeridianProblem
+from epsmesh.solve.meridian.problem import MeridianProblem, how_for
 from epsmesh.solve.meridian.punch import RoundTool
 from epsmesh.solve.movement import FarField, Movement, Place
 from epsmesh.solve.newton import LargeError
@@ -100,20 +100,23 @@ def memory_of_basis(case: Case, dofs: int) -> float:
     return solving + estimate.basis_memory(dofs, case.mesh.degree)
 
 
-def meridian_problem(case: Case) -> Problem:
-    """Return the problem of an axisymmetric ``case`` without loads, on its meridian."""
+def meridian_problem(case: Case, goal: float | None = None) -> Problem:
+    """Return the problem of an axisymmetric ``case`` without loads, on its meridian.
+
+    It is as accurate as the ``goal`` needs, a relative error of F; without one, as it can be.
+    """
     if crack := case.probe.crack:
         return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
     half_plane = replace(meridian_of(case), fields=half_plane_fields(case))
+    of_steps = {} if goal is None else {"accuracy": goal / 2}
     match case.way.is_found, case.way.has_steps:
         case True, True:
-            how = {} if case.mesh.accuracy is None else {"accuracy": case.mesh.accuracy / 2}
-            return LargeMeridianContact(half_plane, round_tool_of(case), **how)
+            return LargeMeridianContact(half_plane, round_tool_of(case), **of_steps)
         case True, False:
-            return MeridianContact(half_plane, round_tool_of(case))
+            return MeridianContact(half_plane, round_tool_of(case), **how_for(goal))
         case False, True:
-            return LargeMeridian(half_plane, conditions_of(case))
-    return MeridianProblem(half_plane, conditions_of(case))
+            return LargeMeridian(half_plane, conditions_of(case), **of_steps)
+    return MeridianProblem(half_plane, conditions_of(case), **how_for(goal))
 
 
 def conditions_of(case: Case) -> Conditions:

@@ -226,7 +226,7 @@ class StepRunner:
         return replace(stamped, message=missing, surface_deviation=meshed.spaces.body.deviation)
 
     def _solve_meridian(self, solve: Solve, memory: PeakMemory) -> Record:
-        problem = meridian_problem(solve.case)
+        problem = meridian_problem(solve.case, solve.goal)
 
         def compute() -> Record | LargeError:
             try:

@@ -122,7 +122,7 @@ def solve_fields(
 def _with_force_of_meridian(run: Solve, solved: Solved, comm: MPI.Comm) -> Solved:
     """Return the solution with the record that a run finds on the meridian; collective."""
     prepare(comm, [run])
-    problem = meridian_problem(run.case)
+    problem = meridian_problem(run.case, run.goal)
     record = on_first_rank(comm, lambda: record_of(run, solve_problem(run.case, problem, estimate=True, goal=run.goal)))
     return replace(solved, record=comm.bcast(record), on_meridian=True)
 

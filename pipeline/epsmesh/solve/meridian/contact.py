@@ -15,6 +15,7 @@ Lengths are in units of a, stresses in units of μ of region 0, displacements in
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import exp, inf, log, pi
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact_result import ContactResult
-from epsmesh.solve.meridian.problem import DEGREE, Answer, MeridianSolver, error_bar
+from epsmesh.solve.meridian.problem import Answer, MeridianSolver, error_bar
 from epsmesh.solve.meridian.punch import POWERS, Punches, Rings, RoundTool
 from epsmesh.solve.meridian.signs import LiftsOff, check_signs
 from epsmesh.solve.meridian.system import HalfPlane, max_strain
@@ -42,9 +43,9 @@ _ALONG, _BETWEEN = 20, 8
 class MeridianContact(MeridianSolver):
     """The meridian of an axisymmetric scene with unilateral contact: a tool presses along its axis."""
 
-    def __init__(self, meridian: HalfPlane, tool: RoundTool, *, accuracy: float = 1e-5, degree: int = DEGREE):
-        """Prepare to refine until the error bar is at most ``accuracy``."""
-        super().__init__(meridian, accuracy=accuracy, degree=degree)
+    def __init__(self, meridian: HalfPlane, tool: RoundTool, **how: Any):
+        """Prepare, as :class:`MeridianSolver`; ``how`` are its keywords."""
+        super().__init__(meridian, **how)
         self._tool = tool
 
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:

@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import product
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,9 @@ from epsmesh.viscoelastic import Terms
 DEGREE = 5
 # Meshes, tried in this order until the error bar is below the required accuracy.
 GRADINGS = (Grading(1e-6, 1.0, 4.0), Grading(1e-7, 0.7, 2.0), Grading(1e-8, 0.5, 1.0))
-# Largest error bar of a result.
+# The first mesh for an accuracy of more than _FINE, in elements of one degree less: its bar is about 1e-4.
+_ROUGH, _FINE = Grading(1e-3, 1.0, 4.0), 1e-3
+# Largest error bar of a result, unless less is wanted.
 _WORST_ERROR = 1e-3
 
 
@@ -61,9 +64,14 @@ class Answer:
 class MeridianSolver(Problem):
     """A problem on this process alone; it keeps nothing between solves, and each solve makes its own meshes."""
 
-    def __init__(self, meridian: HalfPlane, *, accuracy: float = 1e-5, degree: int = DEGREE):
-        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
-        self._meridian, self._accuracy, self._degree = meridian, accuracy, degree
+    def __init__(
+        self, meridian: HalfPlane, *, accuracy: float = 1e-5, degree: int = DEGREE, first: Grading | None = None
+    ):
+        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least.
+
+        ``first`` is a mesh that is tried before the others: :func:`how_for`.
+        """
+        self._meridian, self._accuracy, self._degree, self._first = meridian, accuracy, degree, first
 
     def close(self) -> None:
         """Do nothing: there is nothing to free."""
@@ -126,9 +134,20 @@ class MeridianSolver(Problem):
             SolveError: if a solve fails a check, or the error bar stays above 1e-3.
         """
         # Round-off grows with refinement: a mesh finer than an unbalanced one would be no better.
+        gradings = GRADINGS if self._first is None else (self._first, *GRADINGS)
         return best_of(
-            GRADINGS, lambda grading, _: solve_on(grading), self._accuracy, _WORST_ERROR, ends_with=Unbalanced
+            gradings, lambda grading, _: solve_on(grading), self._accuracy, _WORST_ERROR, ends_with=Unbalanced
         )
+
+
+def how_for(accuracy: float | None) -> dict[str, Any]:
+    """Return the keywords of a linear meridian for a relative ``accuracy`` of F; none if it is to be as good as it can.
+
+    Half of the accuracy is left to time steps.
+    """
+    if accuracy is None or accuracy <= _FINE:
+        return {}
+    return {"accuracy": accuracy / 2, "degree": DEGREE - 1, "first": _ROUGH}
 
 
 def best_of(
@@ -145,7 +164,7 @@ def best_of(
     ``ends_with``, the best result before stands.
 
     Raises:
-        SolveError: if another solve fails, or the error bar stays above ``worst``.
+        SolveError: if another solve fails, or the error bar stays above ``worst`` and the accuracy.
     """
     best: Answer | None = None
     for grading in gradings:
@@ -160,8 +179,8 @@ def best_of(
         if best.error <= accuracy:
             break
     assert best is not None
-    if best.error > worst:
-        raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {worst:.0e}")
+    if best.error > (most := max(worst, accuracy)):
+        raise SolveError(f"the error bar of the force is {best.error:.0e}, allowed {most:.0e}")
     return best
 
 
@@ -179,9 +198,9 @@ def error_bar(coarse: float, fine: float, degree: int, balance: float) -> float:
 class MeridianProblem(MeridianSolver):
     """The meridian of an axisymmetric scene whose probe, with prescribed footprint, presses along its axis."""
 
-    def __init__(self, meridian: HalfPlane, conditions: Conditions, *, accuracy: float = 1e-5, degree: int = DEGREE):
-        """Prepare to refine until the error bar is at most ``accuracy``; ``degree`` is 3 at least."""
-        super().__init__(meridian, accuracy=accuracy, degree=degree)
+    def __init__(self, meridian: HalfPlane, conditions: Conditions, **how: Any):
+        """Prepare, as :class:`MeridianSolver`; ``how`` are its keywords."""
+        super().__init__(meridian, **how)
         self._bonded = conditions.bonded
 
     def _answer(self, law: MaterialLaw, depth: float) -> Answer:
