@@ -99,3 +99,13 @@ def test_a_sweep_is_of_one_law_and_one_history_in_the_order_of_its_depths(change
     for sweep in sweeps:
         assert len({(solve.case.material.law, solve.case.probe.history) for solve in sweep}) == 1
         assert [solve.case.probe.depth for solve in sweep] == [5e-4, 1e-3]
+
+
+@pytest.mark.parametrize(("accuracy", "is_told"), [("2 %", False), ("0.5 %", True)])
+def test_an_accuracy_of_which_friction_takes_most_is_told(accuracy, is_told):
+    """In three dimensions friction has a bar that meshes keep; the ladder then begins with its cheapest mesh."""
+    disc = {"contact": "unilateral", "friction": 0.3}
+    plan = make_plan(study(probe=disc, mesh=NO_SIZES | {"accuracy": accuracy}, solve={"exact": False}))
+    assert any("Friction has an error bar of its own" in one.reason for one in plan.skipped) == is_told
+    (solve,) = plan.solves
+    assert (solve.expected > solve.goal) == is_told

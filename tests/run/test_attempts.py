@@ -103,6 +103,22 @@ def test_meshes_that_would_miss_by_as_much_are_passed_over():
     assert solve.again(1e3 * solve.expected).later == solve.later[1:]
 
 
+def test_no_finer_mesh_is_tried_for_what_friction_keeps():
+    """Of a bar of 0.5 % finer meshes lower the rest alone: with 0.35 % of friction none can reach 0.3 %."""
+    found = judged(asked(), record(0.005, friction_error=0.0035))
+    assert found.status == "failed"
+    assert "error bar 0.5 % exceeds the accuracy 0.3 %" in found.message
+    assert "0.35 % of it is that of friction" in found.message
+    assert judged(asked(), record(0.005, friction_error=1e-3), record(0.002)).status == "ok"
+
+
+def test_the_next_mesh_is_that_which_leaves_room_for_friction():
+    solve = asked()
+    smooth, rubbing = (solve.again(2 * solve.expected + kept, kept).expected for kept in (0.0, 0.002))
+    assert rubbing < smooth
+    assert 2 * rubbing + 0.002 <= solve.goal
+
+
 def test_an_accuracy_that_is_missed_for_another_reason_says_both():
     lost = Record("", "failed", "no memory left")
     found = judged(asked(), record(0.02), lost)

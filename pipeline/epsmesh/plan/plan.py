@@ -7,7 +7,7 @@ from math import isnan
 from operator import is_
 
 from epsmesh.plan.key import case_key, normalised, reference_key
-from epsmesh.plan.recipe import rungs_for
+from epsmesh.plan.recipe import friction_bar, rungs_for, takes_most
 from epsmesh.plan.reductions import REDUCTIONS, skip_stored
 from epsmesh.plan.shard import Shard, take
 from epsmesh.plan.steps import Solve
@@ -35,6 +35,10 @@ __all__ = [
     "of_unit_scene",
 ]
 
+_RUBS = (
+    "Friction has an error bar of its own, expected up to {:.2g} % of F, which finer meshes keep: an accuracy below "
+    "twice that takes longer than estimated, or is not reached ({} solves)."
+)
 # Relative error of F_exact, or its share of the study's accuracy: well below the errors of the study.
 EXACT, _EXACT_SHARE = 1e-3, 0.3
 # A slit has many edges: an error of 1e-3 would need three times the cells and ten times the time.
@@ -92,7 +96,19 @@ def make_plan(
     plan = take(first_attempts(plan), shard) if shard is not None else ask_for_ends(plan, without)
     plan = first_attempts(leave_out_stored(plan, stored, without))
     refuse_thin(plan.solves, study.file)
-    return plan
+    return _told_of_friction(plan)
+
+
+def _told_of_friction(plan: Plan) -> Plan:
+    """Return the plan with a word on accuracies of which friction's own bar is expected to take most."""
+    bars = [
+        friction_bar(solve.case)
+        for solve in plan.solves
+        if solve.goal is not None and not solve.axisymmetric and takes_most(solve.case, solve.goal)
+    ]
+    if not bars:
+        return plan
+    return replace(plan, skipped=(*plan.skipped, Skipped("accuracy", 0, _RUBS.format(100 * max(bars), len(bars)))))
 
 
 def _seeking(plan: Plan) -> Plan:

@@ -7,7 +7,7 @@ If a case's own error bar exceeds the accuracy, the next mesh is tried.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, pi, sqrt
+from math import hypot, log1p, pi, sqrt
 from typing import Any
 
 from epsmesh.plan import ladders
@@ -38,9 +38,9 @@ _OF_LARGE, _BY_DEPTH = 1.8, 6.0
 # Error bars grow by 1 + 10 a/H with the probe's half width a over the body's thickness H, measured up to _THINNEST;
 # where the probe's edge dominates, by 1 + a/H.
 _THICKNESS, _THICKNESS_EVEN, _THINNEST = 10.0, 1.0, 0.15
-# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree, and the same at large
-# displacements.
-_MIXED, _MIXED_LARGE = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}
+# Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree; the same at large
+# displacements, and for a flat tool whose contact is found.
+_MIXED, _MIXED_LARGE, _MIXED_FLAT = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}, {2: 0.6}
 # Error bars with several movements, of a column, or of a tool that is not round, in units of those without, by degree.
 _SEVERAL = {2: 1.5, 3: 1.15}
 # Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
@@ -54,6 +54,9 @@ _SLIDE = 0.8
 MARGIN, _STEP = 0.9, 1.4
 # Thickness of a thin body, in half widths of contact: its pressure follows the tool's shape, and is smoother.
 _SQUEEZED = 1.5
+# Expected bar of friction: this share of what sticking adds to the force of a flat disc, or of other tools, but at most
+# so much times the coefficient; benchmarks/results/friction.md.
+_OF_STICKING, _OF_CURVED, _OF_COEFFICIENT = 0.2, 0.55, 0.04
 # Number of elements between the probe's edge and a fixed face.
 _ACROSS_GAP = 3
 # Number of elements through the thickness near the probe.
@@ -63,11 +66,13 @@ _THROUGH = 2
 def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
     """Return the meshes to try, in turn, for a relative error of F below ``accuracy``.
 
-    Values that the study gives for rim, growth, degree and sizes stay.
+    Values that the study gives for rim, growth, degree and sizes stay. If friction :func:`takes_most`, the first mesh
+    is the coarsest: it tells how much.
     """
     ladder = _ladder(case)
-    expected = _expected(case, ladder)
-    first = next((i for i, bar in enumerate(expected) if bar <= MARGIN * accuracy), len(ladder) - 1)
+    expected, of_friction = _expected(case, ladder), friction_bar(case)
+    enough = (i for i, bar in enumerate(expected) if bar <= MARGIN * (accuracy - of_friction))
+    first = 0 if takes_most(case, accuracy) else next(enough, len(ladder) - 1)
     tried = [first]
     for number in range(first + 1, len(ladder)):
         if _STEP * expected[number] <= expected[tried[-1]] or number == len(ladder) - 1:
@@ -124,12 +129,31 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     is_even = ladder is ladders.EVEN
     thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
     shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
-    of_degree = _MIXED_LARGE if case.way.is_nonlinear else _MIXED
+    of_degree = _MIXED_LARGE if case.way.is_nonlinear else _MIXED_FLAT if ladder is ladders.FLAT else _MIXED
     if case.way.element == "displacement":
         of_degree = dict.fromkeys(_MIXED, 1.0)
     if is_even and not has_sure_limit(case):
         of_degree = {degree: factor * _SEVERAL[degree] for degree, factor in of_degree.items()}
     return [float(recipe.bar * shape * of_degree[recipe.degree]) for recipe in ladder]
+
+
+def friction_bar(case: Case) -> float:
+    """Return the expected relative bar of friction on F, which all meshes in three dimensions keep; 0 without friction.
+
+    On a half-space, the forces of a disc to which tissue sticks and of a frictionless one have a known ratio
+    (D. A. Spence, Proc. R. Soc. Lond. A 305, 55, 1968).
+    """
+    if not case.way.rubs:
+        return 0.0
+    apart = 1 - 2 * case.poisson
+    ratio = (1 - case.poisson) * log1p(2 * apart) / apart if apart > 0 else 1.0
+    sticking = _OF_STICKING * (ratio - 1) * (1.0 if case.probe.has_singular_edge else _OF_CURVED)
+    return min(sticking, _OF_COEFFICIENT * case.probe.friction)
+
+
+def takes_most(case: Case, accuracy: float) -> bool:
+    """Return whether friction's own bar is expected to leave meshes less than half of the ``accuracy``."""
+    return friction_bar(case) > accuracy / 2
 
 
 def has_sure_limit(case: Case) -> bool:

@@ -1,6 +1,6 @@
 """The steps that a study needs: solves, grouped by operator and by mesh."""
 
-from collections.abc import Callable, Collection, Hashable
+from collections.abc import Callable, Collection, Hashable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
@@ -61,20 +61,26 @@ class Solve:
         moved = f", {self.end_of} at an end of its bar" if self.end_of else ""
         return f"F_exact of {self.case}" if self.is_reference else f"{self.case}{moved}"
 
-    def again(self, bar: float = nan) -> "Solve":
+    def again(self, bar: float = nan, kept: float = 0.0) -> "Solve":
         """Return the next attempt at the goal.
 
-        ``bar`` is the error bar of the last attempt. Its ratio to the expected one corrects the expectations of later
-        meshes, and the first that should reach the goal is chosen.
+        ``bar`` is the error bar of the last attempt, of which meshes keep the part ``kept``. The ratio of the rest to
+        the expected bar corrects the expectations of later meshes, and the first that should reach the goal is chosen.
         """
-        more, goal = bar / self.expected, self.goal or 0.0
-        if not self.case.probe.is_flat:
-            more = min(more, _WORSE)
-        serves = (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
-        number = next(serves, 0)
+        number = next(self._serving(bar, kept), 0)
         rung = self.later[number]
         case = replace(self.case, mesh=rung.mesh)
         return replace(self, case=case, later=self.later[number + 1 :], expected=rung.bar)
+
+    def is_out_of_reach(self, bar: float, kept: float) -> bool:
+        """Return whether no later mesh should reach the goal, since all keep a part of the bar: see :meth:`again`."""
+        return kept > 0 and next(self._serving(bar, kept), None) is None
+
+    def _serving(self, bar: float, kept: float) -> Iterator[int]:
+        more, goal = (bar - kept) / self.expected, (self.goal or 0.0) - kept
+        if not self.case.probe.is_flat:
+            more = min(more, _WORSE)
+        return (number for number, rung in enumerate(self.later) if more * rung.bar <= MARGIN * goal)
 
 
 @dataclass(frozen=True)

@@ -27,9 +27,12 @@ class Attempts:
         # A meridian has chosen among its own meshes.
         has_next = bool(solve.later) and not solve.axisymmetric
         if record.is_ok and record.proven > solve.goal and has_next:
-            self._earlier.setdefault(solve.key, []).append(record)
-            self._again[solve.key] = solve.again(record.proven)
-            return None
+            bar = record.proven, record.friction_error
+            if not solve.is_out_of_reach(*bar):
+                self._earlier.setdefault(solve.key, []).append(record)
+                self._again[solve.key] = solve.again(*bar)
+                return None
+            record = replace(record, message="; ".join(filter(None, (record.message, _kept(record)))))
         return _concluded(solve, record, self._earlier.pop(solve.key, []))
 
     def has_next(self, solve: Solve) -> bool:
@@ -94,6 +97,10 @@ def _concluded(solve: Solve, last: Record, earlier: list[Record]) -> Record:
     why = last.message or "this is the finest mesh tried"
     bar, goal = _percent(best.proven), _percent(solve.goal)
     return failed(record, f"error bar {bar} exceeds the accuracy {goal}: {why}")
+
+
+def _kept(record: Record) -> str:
+    return f"{_percent(record.friction_error)} of it is that of friction, which finer meshes keep"
 
 
 def _percent(share: float) -> str:

@@ -54,6 +54,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         depth=case.scale.length,
         force=force,
         force_error=bar / abs(force),
+        friction_error=0.0 if solution.contact is None else solution.contact.friction_bar,
         force_vector=turned_back(turn, _known_of(case, solution.reaction)),
         force_vector_error=_vector_bars(case, solution),
         stiffness=_rows(solution.stiffness, turn) if case.way.motion is Motion.SIX else (),

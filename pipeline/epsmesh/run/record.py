@@ -42,7 +42,7 @@ class Record:
     - ``young`` (Pa) and ``depth`` (m): the :class:`Scale` of the case.
     - ``force_vector`` (N): the force of the tissue on the probe, with error bars ``force_vector_error`` (N, NaN if
       unknown); ``force``: its part against the probe's advance, with the relative 95 % error bar ``force_error``, whose
-      computation took ``time_error`` seconds.
+      computation took ``time_error`` seconds; ``friction_error``: the part of it for friction, which finer meshes keep.
     - ``depth_reached`` (m), ``force_reached`` (N): where load steps ended before the depth, and the force there; such
       a record is "partial".
     - ``stiffness``: of all six rigid motions, with the error bars ``stiffness_error``; empty without `motion = "all"`.
@@ -74,6 +74,7 @@ class Record:
     depth: float = nan
     force: float = nan
     force_error: float = nan
+    friction_error: float = 0.0
     force_vector: tuple[float, float, float] = (nan, nan, nan)
     force_vector_error: tuple[float, float, float] = (nan, nan, nan)
     depth_reached: float = nan
