@@ -102,6 +102,16 @@ def test_places_are_solved_until_the_error_is_small_enough_and_tissues_at_the_sa
     assert 8 <= counts[0] < counts[1] < 41
 
 
+def test_an_interpolated_bar_above_the_accuracy_is_told():
+    """The accuracy is that of solved places: interpolation adds to it, within `path_error`."""
+    none = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth"))
+    for accuracy, is_told in (("0.6 %", True), ("3 %", False)):
+        found = build(*solved(scene("1 %", mesh=none | {"accuracy": accuracy}), synthetic))
+        within = (found["force_error"] <= float(accuracy[:-2]) / 100 * found["force"]).values
+        assert within.all() != is_told
+        assert [text != "" for text in found["message"].values] == (~within).tolist()
+
+
 def test_an_interpolated_force_is_proportional_to_the_depth():
     forces = build(*solved(scene(probe={"depth": ["0.1 mm", "0.2 mm"]}), synthetic))["force"]
     np.testing.assert_allclose(forces.isel(depth=1), 2 * forces.isel(depth=0), rtol=1e-12)

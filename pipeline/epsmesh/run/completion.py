@@ -14,6 +14,11 @@ from epsmesh.run import given_force
 from epsmesh.run.record import Record
 from epsmesh.states import OK
 
+# A smaller `path_error` solves more places; without one, all are solved.
+_EXCEEDS = (
+    "interpolated: its error bar exceeds the accuracy of solved places, {:.2g} %, to which [plan] path_error adds"
+)
+
 
 def complete(
     plan: Plan, records: dict[str, Record], get: Callable[[Collection[str]], Mapping[str, Record]]
@@ -78,11 +83,16 @@ def _plan_of(plan: Plan, solves: Mapping[str, Solve]) -> Plan | None:
 
 
 def _record(solve: Solve, force: float, error: float) -> Record:
-    """Return the record of an interpolated place: F (N) with its relative error bar, and nothing else."""
-    scale = solve.case.scale
+    """Return the record of an interpolated place: F (N) with its relative error bar, and nothing else.
+
+    A message says if the bar is larger than the accuracy, which is that of solved places.
+    """
+    scale, goal = solve.case.scale, solve.goal
+    exceeds = goal is not None and error > goal
     return Record(
         solve.key,
         OK,
+        _EXCEEDS.format(100 * (goal or 0.0)) if exceeds else "",
         origin="interpolated",
         young=scale.stress,
         depth=scale.length,
