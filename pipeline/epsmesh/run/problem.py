@@ -108,15 +108,16 @@ def meridian_problem(case: Case, goal: float | None = None) -> Problem:
     if crack := case.probe.crack:
         return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
     half_plane = replace(meridian_of(case), fields=half_plane_fields(case))
-    of_steps = {} if goal is None else {"accuracy": goal / 2}
+    how = how_for(goal)
+    of_steps = {key: how[key] for key in how.keys() & {"accuracy"}}
     match case.way.is_found, case.way.has_steps:
         case True, True:
             return LargeMeridianContact(half_plane, round_tool_of(case), **of_steps)
         case True, False:
-            return MeridianContact(half_plane, round_tool_of(case), **how_for(goal))
+            return MeridianContact(half_plane, round_tool_of(case), **how)
         case False, True:
             return LargeMeridian(half_plane, conditions_of(case), **of_steps)
-    return MeridianProblem(half_plane, conditions_of(case), **how_for(goal))
+    return MeridianProblem(half_plane, conditions_of(case), **how)
 
 
 def conditions_of(case: Case) -> Conditions:

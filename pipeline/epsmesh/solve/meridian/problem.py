@@ -143,7 +143,7 @@ class MeridianSolver(Problem):
 def how_for(accuracy: float | None) -> dict[str, Any]:
     """Return the keywords of a linear meridian for a relative ``accuracy`` of F; none if it is to be as good as it can.
 
-    Half of the accuracy is left to time steps.
+    Those of load steps take the "accuracy" alone. Half of it is left to time steps.
     """
     if accuracy is None or accuracy <= _FINE:
         return {}
