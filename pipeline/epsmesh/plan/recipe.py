@@ -40,7 +40,7 @@ _OF_LARGE, _BY_DEPTH = 1.8, 6.0
 _THICKNESS, _THICKNESS_EVEN, _THINNEST = 10.0, 1.0, 0.15
 # Error bars of mixed elements, in units of those of displacement elements at ν = 0.3, by degree; the same at large
 # displacements, and for a flat tool whose contact is found.
-_MIXED, _MIXED_LARGE, _MIXED_FLAT = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}, {2: 0.6}
+_MIXED, _MIXED_LARGE, _MIXED_FLAT = {2: 1.2, 3: 1.05}, {2: 1.0, 3: 1.05}, {2: 0.85}
 # Error bars with several movements, of a column, or of a tool that is not round, in units of those without, by degree.
 _SEVERAL = {2: 1.5, 3: 1.15}
 # Factor for several materials, curved surfaces, and plates, by element (solve/estimate.py).
