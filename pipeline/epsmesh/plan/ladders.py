@@ -48,21 +48,14 @@ EVEN = (
     Recipe(3, 0.05, 0.35, 1.9e-4),
     Recipe(3, 0.025, 0.3, 1.0e-4),
 )
-# On a curved surface, bars are 1.2 to 2 times those of LADDER, and smaller elements of degree 2 have a smaller one than
-# the first rung of degree 3, in the same time (benchmarks/results/decisions.md).
+# On a curved surface, smaller elements of degree 2 have a smaller error bar than the first rung of degree 3, in the
+# same time (benchmarks/results/decisions.md).
 ROUND = (
-    Recipe(2, 0.4, 0.7, 6.4e-3),
-    Recipe(2, 0.3, 0.6, 4.5e-3),
-    Recipe(2, 0.2, 0.5, 2.8e-3),
-    Recipe(2, 0.15, 0.45, 2.0e-3),
-    Recipe(2, 0.15, 0.35, 1.6e-3),
-    Recipe(2, 0.1, 0.3, 1.25e-3),
-    Recipe(2, 0.07, 0.25, 8.4e-4),
-    Recipe(3, 0.2, 0.5, 7.4e-4),
-    Recipe(3, 0.15, 0.45, 4.9e-4),
-    Recipe(3, 0.1, 0.4, 2.8e-4),
-    Recipe(3, 0.05, 0.35, 1.4e-4),
-    Recipe(3, 0.025, 0.3, 7.0e-5),
+    *LADDER[:4],
+    Recipe(2, 0.15, 0.35, 1.15e-3),
+    Recipe(2, 0.1, 0.3, 9.0e-4),
+    Recipe(2, 0.07, 0.25, 6.0e-4),
+    *LADDER[5:],
 )
 # Unilateral contact uses degree 2. Its bars below flat faces are 2.3 to 2.9 times those of LADDER.
 FLAT = (

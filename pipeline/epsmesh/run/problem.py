@@ -109,7 +109,8 @@ def meridian_problem(case: Case, goal: float | None = None) -> Problem:
         return NeedleSolver(crack.radius, crack.toughness, ring_cuts if crack.is_ring else plane_cuts)
     half_plane = replace(meridian_of(case), fields=half_plane_fields(case))
     how = how_for(goal)
-    of_steps = {key: how[key] for key in how.keys() & {"accuracy"}}
+    # Half of the accuracy is left to time steps.
+    of_steps = {"accuracy": how["accuracy"] / (2 if case.way.in_time else 1)} if how else {}
     match case.way.is_found, case.way.has_steps:
         case True, True:
             return LargeMeridianContact(half_plane, round_tool_of(case), **of_steps)

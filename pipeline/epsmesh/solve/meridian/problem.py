@@ -143,11 +143,11 @@ class MeridianSolver(Problem):
 def how_for(accuracy: float | None) -> dict[str, Any]:
     """Return the keywords of a linear meridian for a relative ``accuracy`` of F; none if it is to be as good as it can.
 
-    Those of load steps take the "accuracy" alone. Half of it is left to time steps.
+    Meridians with load steps take the "accuracy" alone.
     """
     if accuracy is None or accuracy <= _FINE:
         return {}
-    return {"accuracy": accuracy / 2, "degree": DEGREE - 1, "first": _ROUGH}
+    return {"accuracy": accuracy, "degree": DEGREE - 1, "first": _ROUGH}
 
 
 def best_of(
