@@ -154,9 +154,7 @@ def judged(
     Studies ``finer_than`` it, for its relative bar, are tried as its truth if they take at most the ``longest`` time
     (s), as planned. ``look`` follows the scene's solve.
     """
-    start = time.process_time()
-    _, most = resource.getrlimit(resource.RLIMIT_CPU)
-    resource.setrlimit(resource.RLIMIT_CPU, (int(start) + _LIMIT, most))
+    start = limit_processor()
     study, classes = drawn(seed, folder)
     with look or nullcontext():
         found = solve(copy.deepcopy(study), folder)
@@ -168,24 +166,49 @@ def judged(
 
     if not found.is_taken:
         return row(f"{found.kind}: {' '.join(found.message.split())[:300]}")
-    name = "depth" if "force" in study["probe"] else "force"
-    bars = _relative(found, name)
+    bar, truth = relative_bar(found, _main(study)), truth_of(study, found, folder, finer_than, longest)
+    if isinstance(truth, str):
+        return row(truth, bar)
+    return row("judged", bar, *compared(found, truth), **(look.read(found, truth) if look else {}))
+
+
+def truth_of(
+    study: Study,
+    found: Outcome,
+    folder: Path,
+    finer_than: Callable[[Study, float], Iterable[Study]] = truths,
+    longest: float = _LONG,
+) -> Outcome | str:
+    """Return the finer solution of a scene that was ``found``, known to a third of its bar, or why there is none."""
+    name = _main(study)
     reason = "its truth takes too long"
-    for finer in finer_than(study, bars):
+    for finer in finer_than(study, relative_bar(found, name)):
         if seconds(finer, folder) > longest:
             continue
         truth = solve(copy.deepcopy(finer), folder)
         if not truth.is_taken:
             reason = f"its truth {truth.kind}: {' '.join(truth.message.split())[:200]}"
-            continue
-        errors, known = compared(found, truth)
-        if known.get(name, math.inf) <= _KNOWN:
-            return row("judged", bars, errors, known, **(look.read(found, truth) if look else {}))
-        reason = "its truth is not known well enough"
-    return row(reason, bars)
+        elif compared(found, truth)[1].get(name, math.inf) <= _KNOWN:
+            return truth
+        else:
+            reason = "its truth is not known well enough"
+    return reason
 
 
-def _relative(found: Outcome, name: str) -> float:
+def limit_processor(most_seconds: int = _LIMIT) -> float:
+    """Return the processor's time (s) of this process, which the system ends after ``most_seconds`` more."""
+    start = time.process_time()
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(start) + most_seconds, most))
+    return start
+
+
+def _main(study: Study) -> str:
+    return "depth" if "force" in study["probe"] else "force"
+
+
+def relative_bar(found: Outcome, name: str) -> float:
+    """Return the largest bar of a quantity, relative to it."""
     value = found.values[name]
     with np.errstate(all="ignore"):
         return float(np.nanmax(value.bars / np.abs(value.numbers)))
@@ -295,7 +318,12 @@ def resumed(
 
 
 def campaign(
-    arguments: list[str], about: str | None, name: str, drawn: Drawn, told: Callable[[list[Row]], str]
+    arguments: list[str],
+    about: str | None,
+    name: str,
+    drawn: Drawn,
+    told: Callable[[list[Row]], str],
+    judge: Callable[[int, Path, Drawn], Row] = judged,
 ) -> list[Row]:
     """Run the scenes that the options in ``arguments`` name, write and print what is ``told`` of them, return the rows.
 
@@ -309,7 +337,7 @@ def campaign(
     first, end = map(int, asked.seeds.split(":"))
     kind = next((name for name, (low, high) in SEEDS.items() if low <= first < end <= high), "sealed")
     log = asked.output / f"{name}-{kind}.jsonl"
-    rows = resumed(log, range(first, end), 60 * asked.minutes, drawn)
+    rows = resumed(log, range(first, end), 60 * asked.minutes, drawn, judge)
     text = told(rows)
     write(name if kind == "test" else f"{name}-{kind}", asked.output, [asdict(row) for row in rows], text)
     print(text)

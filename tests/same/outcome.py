@@ -29,13 +29,18 @@ class Value:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a study: ``kind`` is taken, refused, failed or traceback; the values are those of its dataset."""
+    """What became of a study: ``kind`` is taken, refused, failed or traceback; the values are those of its dataset.
+
+    ``origin`` is how F was obtained, ``of_bar`` the share of the time that its bar took.
+    """
 
     kind: str
     message: str = ""
     values: dict[str, Value] = field(default_factory=dict)
     cells: int = 0
     dofs: int = 0
+    origin: str = field(default="", compare=False)
+    of_bar: float = field(default=0.0, compare=False)
 
     @property
     def is_taken(self) -> bool:
@@ -92,7 +97,10 @@ def of_dataset(dataset: xr.Dataset, at: Mapping[str, int] = _WHOLE) -> Outcome:
                 np.asarray(bars, dtype=float),
                 (*map(str, variable.dims),),
             )
-    return Outcome("taken", "", values, int(dataset["cells"].max()), int(dataset["dofs"].max()))
+    origin = str(np.atleast_1d(dataset["origin"].values).ravel()[0]) if "origin" in dataset else ""
+    shown, bar = (float(dataset[name].sum()) if name in dataset else 0.0 for name in ("time_total", "time_error"))
+    of_bar = bar / (shown + bar) if bar > 0 else 0.0
+    return Outcome("taken", "", values, int(dataset["cells"].max()), int(dataset["dofs"].max()), origin, of_bar)
 
 
 def is_of_the_run(name: str) -> bool:
