@@ -15,6 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial, wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Self, get_type_hints
 
@@ -57,7 +58,7 @@ class Trace:
 
     def __enter__(self) -> Self:
         for name, modules in _CALLED.items():
-            for module in map(_imported, modules):
+            for module in map(import_module, modules):
                 function = getattr(module, name)
                 self._before.append((module, name, function))
                 setattr(module, name, self._followed(name, function))
@@ -99,11 +100,6 @@ class Trace:
             if abs(record.force_error * abs(force) - bar) <= 1e-6 * bar:
                 return facts
         return {}
-
-
-def _imported(name: str) -> Any:
-    __import__(name)
-    return sys.modules[name]
 
 
 def _plain(value: Any) -> Any:
