@@ -98,7 +98,7 @@ def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
     found, known["cost"] = _timed(finest, folder)
     if not found.is_taken:
         return row(f"{found.kind}: {' '.join(found.message.split())[:300]}")
-    truth = truth_of(finest, found, folder, _LONG)
+    truth = truth_of(finest, found, folder, longest=_LONG)
     if isinstance(truth, str):
         return row(truth)
     case = next(read_mapping(finest, "rivals", folder).cases())
