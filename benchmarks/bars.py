@@ -29,8 +29,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from benchmarks.tables import markdown, options, write
+from epsmesh.plan.plan import make_plan
+from epsmesh.plan.steps import Solve
 from epsmesh.study.read import read_mapping
-from epsmesh.study.way import Dimension
 from tests.isolated import isolated
 from tests.pairs import FEATURES, Study
 from tests.same.outcome import Outcome, solve
@@ -103,13 +104,17 @@ def scene(seed: int, folder: Path) -> tuple[Study, dict[str, str]]:
                 break
         else:
             sizes = "as drawn"
-    case = next(read_mapping(study, "bars", folder).cases())
-    if case.way.dimension is Dimension.MERIDIAN and dice.random() < _IN_3D:
+    solve = _first_solve(study, folder)
+    if solve.axisymmetric and dice.random() < _IN_3D:
         other = study | {"mesh": study["mesh"] | {"model": "3d"}}
         if seconds(other, folder) <= _SHORT:
-            study, case = other, next(read_mapping(other, "bars", folder).cases())
-    slots["dimension"] = case.way.dimension.value
-    return study, slots | {"mesh": sizes, "order": str(case.mesh.degree), "element": case.way.element}
+            study, solve = other, _first_solve(other, folder)
+    slots["dimension"] = solve.way.dimension.value
+    return study, slots | {"mesh": sizes, "order": str(solve.case.mesh.degree), "element": solve.way.element}
+
+
+def _first_solve(study: Study, folder: Path) -> Solve:
+    return make_plan(read_mapping(study, "bars", folder)).solves[0]
 
 
 def _other_proportions(study: Study, dice: random.Random, folder: Path) -> Study:

@@ -54,6 +54,7 @@ NIGHTLY = (
             "mesh/test_meeting_regions.py::test_a_hollow_region_leaves_its_neighbours_alone",
             "plan/test_reductions.py::test_all_at_once",
             "run/test_begun.py::test_a_run_that_is_killed_on_a_path_with_friction_is_taken_up_with_the_forces_of_one_that_was_not",
+            "run/test_jobs.py::test_what_is_finished_when_the_run_is_ended_is_kept",
             "run/test_pyramid.py::test_force_does_not_depend_on_the_direction_and_grows_with_the_square_of_the_depth",
             "solve/test_axisymmetric.py::test_element_does_not_depend_on_youngs_modulus",
             "solve/test_axisymmetric.py::test_more_support_is_stiffer",
