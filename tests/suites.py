@@ -52,6 +52,7 @@ NIGHTLY = (
             "insertion/test_command.py::test_two_layers_have_two_punctures_and_a_withdrawal_by_solves",
             "mesh/test_meeting_regions.py::test_a_border_of_an_image_has_the_force_of_a_layer_that_the_kernel_draws",
             "mesh/test_meeting_regions.py::test_a_hollow_region_leaves_its_neighbours_alone",
+            "mesh/test_meeting_regions.py::test_parts_of_one_material_have_the_force_of_the_whole",
             "plan/test_reductions.py::test_all_at_once",
             "run/test_begun.py::test_a_run_that_is_killed_on_a_path_with_friction_is_taken_up_with_the_forces_of_one_that_was_not",
             "run/test_jobs.py::test_what_is_finished_when_the_run_is_ended_is_kept",

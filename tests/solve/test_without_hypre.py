@@ -40,7 +40,8 @@ def test_without_hypre_a_force_is_that_of_a_factorisation(monkeypatch, scene):
         for method in ("iterative", "iterative", "direct")
     )
     assert found.status == exact.status == "ok", found.message
-    assert found.force == pytest.approx(exact.force, rel=1e-7)
+    # On several ranks, partitions and with them roundings may differ from run to run.
+    assert found.force == pytest.approx(exact.force, rel=1e-7 if MPI.COMM_WORLD.size == 1 else 3e-7)
     assert 1 < found.iterations <= most
-    if MPI.COMM_WORLD.size == 1:  # partitions may differ from run to run
+    if MPI.COMM_WORLD.size == 1:
         assert (again.force, again.iterations) == (found.force, found.iterations)
