@@ -253,12 +253,18 @@ def table(rows: Iterable[Row]) -> list[dict[str, Any]]:
     return [_line("all", first), *(_line(name, groups[name]) for name in sorted(groups))] if first else []
 
 
+def interval(held: int, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of the share of bars that hold (E. B. Wilson, 1927), where ``held`` of ``count`` did."""
+    found = binomtest(held, count).proportion_ci(method="wilson")
+    return float(found.low), float(found.high)
+
+
 def _line(name: str, errors: list[float]) -> dict[str, Any]:
     held = sum(error <= 1 for error in errors)
-    interval = binomtest(held, len(errors)).proportion_ci(method="wilson")
+    low, high = interval(held, len(errors))
     return {
         "class": name, "scenes": len(errors), "held": held, "share": held / len(errors),
-        "95 %": f"{interval.low:.1%} to {interval.high:.1%}", "bar / error": 1 / max(median(errors), 1e-9),
+        "95 %": f"{low:.1%} to {high:.1%}", "bar / error": 1 / max(median(errors), 1e-9),
         "worst": max(errors),
     }  # fmt: skip
 

@@ -31,9 +31,8 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
-from benchmarks.bars import Drawn, Row, campaign, limit_processor, relative_bar, scene, truth_of
+from benchmarks.bars import Drawn, Row, campaign, interval, limit_processor, relative_bar, scene, truth_of
 from benchmarks.grids import Estimate, grid_convergence_index, median_interval
 from benchmarks.tables import markdown, options
 from epsmesh.study.read import read_mapping
@@ -254,10 +253,10 @@ def lines(rows: Iterable[Row]) -> list[dict[str, Any]]:
 
 def _line(method: Method, found: list[Verdict], ours: list[Verdict]) -> dict[str, Any]:
     held = sum(one.holds for one in found)
-    interval = binomtest(held, len(found)).proportion_ci(method="wilson")
+    low, high = interval(held, len(found))
     return {
         "method": method.name, "scenes": len(found), "held": held, "share": held / len(found),
-        "95 %": f"{interval.low:.0%} to {interval.high:.0%}", "undecided": sum(one.is_undecided for one in found),
+        "95 %": f"{low:.0%} to {high:.0%}", "undecided": sum(one.is_undecided for one in found),
         "bar / error": median(one.ratio for one in found), "bar, % of F": 100 * median(one.share for one in found),
         "solves": len([name for name in method.solves if name != "solve recovered"]),
         "cost": median(one.cost for one in found),
