@@ -47,7 +47,7 @@ _IN_3D = 0.7  # share of round scenes solved in three dimensions, whose truth is
 # The truth's accuracy, in bars, and its limits; its own bar may be this share of the scene's at most.
 _FINER, _ACCURACIES, _KNOWN = 10, (0.001, 0.02), 1 / 3
 _SHORT, _LONG = 8.0, 60.0  # seconds that a scene and its truth may take, as planned
-_LIMIT = 150  # seconds of the processor after which a scene is given up
+_LIMIT = 60  # seconds of the processor after which a scene is given up
 _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
 
 
