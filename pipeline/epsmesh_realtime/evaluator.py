@@ -1,9 +1,11 @@
 """A model in the memory of the evaluator in C: what it answers, as numbers. `c/*.h` define them."""
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from math import nan
 from struct import Struct
 from typing import Any
@@ -23,6 +25,7 @@ MOST_MODES = 96
 # Largest number of terms of a relaxation.
 MOST_RELAXING = 6
 _TOUCH = Struct("@i6d")
+_TOUCHES = np.dtype([("status", np.int32), ("numbers", np.float64, 6)], align=True)
 _STATUSES = 16
 _FLAWS = (
     "",
@@ -115,19 +118,20 @@ class Evaluator:
         self._c.epsmesh_touch_each(self._model, 1, query, found)
         return touch_of(found)
 
-    def touch_each(self, queries: NDArray[Any]) -> Touches:
+    def touch_each(self, queries: NDArray[Any], threads: int = 1) -> Touches:
         """Return the answers of packed queries (:func:`epsmesh_realtime.query.packed_each`), each by itself.
 
         Raises:
-            TypeError: if they are something else.
+            TypeError: if they are something else; ValueError: if ``threads`` is not positive.
         """
-        if queries.dtype.itemsize != QUERY_SIZE:
-            raise TypeError(f"a packed query has {QUERY_SIZE} bytes, and these have {queries.dtype.itemsize}")
-        queries = np.ascontiguousarray(queries)
-        found = np.zeros(len(queries), [("status", np.int32), ("pad", np.int32), ("numbers", np.float64, 6)])
-        self._c.epsmesh_touch_each(self._model, len(queries), queries.ctypes.data, found.ctypes.data)
-        numbers = found["numbers"]
-        return Touches(words()[found["status"]], numbers[:, :3], *numbers[:, 3:].T)
+        queries, found = many(queries)
+
+        def answer(part: slice) -> None:
+            mine, answers = queries[part], found[part]
+            self._c.epsmesh_touch_each(self._model, len(mine), mine.ctypes.data, answers.ctypes.data)
+
+        side_by_side(answer, len(queries), threads)
+        return touches_of(found)
 
     def touch_all(self, queries: Sequence[bytes]) -> list[Touch]:
         """Return the answers of tools that press at once."""
@@ -199,6 +203,7 @@ def word(status: int) -> str:
     return str(found.decode())
 
 
+@cache
 def words() -> NDArray[np.str_]:
     """Return the names of all statuses, by number."""
     return np.array([word(status) for status in range(_STATUSES)])
@@ -208,6 +213,40 @@ def touch_of(found: Any, number: int = 0) -> Touch:
     """Return a touch of C."""
     status, x, y, z, error, stiffness, radius = _TOUCH.unpack_from(found, number * TOUCH_SIZE)
     return Touch(word(status), np.array([x, y, z]), error, stiffness, radius)
+
+
+def many(queries: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return packed queries as C reads them, and room for their answers.
+
+    Raises:
+        TypeError: if they are something else.
+    """
+    if queries.dtype.itemsize != QUERY_SIZE:
+        raise TypeError(f"a packed query has {QUERY_SIZE} bytes, and these have {queries.dtype.itemsize}")
+    return np.ascontiguousarray(queries), np.zeros(len(queries), _TOUCHES)
+
+
+def touches_of(found: NDArray[Any]) -> Touches:
+    """Return the touches of C."""
+    numbers = found["numbers"]
+    return Touches(words()[found["status"]], numbers[:, :3], *numbers[:, 3:].T)
+
+
+def side_by_side(work: Callable[[slice], None], count: int, threads: int) -> None:
+    """Do the ``work`` of ``count`` queries in ``threads`` parts at the same time: C releases Python's lock.
+
+    Raises:
+        ValueError: if ``threads`` is not positive.
+    """
+    if threads < 1:
+        raise ValueError(f"threads must be at least 1, not {threads}")
+    ends = [count * part // threads for part in range(threads + 1)]
+    parts = [slice(*pair) for pair in pairwise(ends)]
+    if threads == 1:
+        work(parts[0])
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, parts))
 
 
 def _aligned(data: bytes) -> NDArray[np.uint8]:

@@ -4,11 +4,13 @@ import ctypes
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
-from epsmesh_realtime.evaluator import touch_of
+from numpy.typing import ArrayLike
+
+from epsmesh_realtime.evaluator import many, touch_of, touches_of
 from epsmesh_realtime.library import library, size_of
 from epsmesh_realtime.model import Model
-from epsmesh_realtime.query import Query
-from epsmesh_realtime.touch import Touch
+from epsmesh_realtime.query import Query, in_order, packed_each
+from epsmesh_realtime.touch import Touch, Touches
 
 
 @dataclass(eq=False)
@@ -44,3 +46,24 @@ class History:
         model = self.model
         packed = Query(tool, **asked).packed(model.young, model.poisson)
         return touch_of(library().epsmesh_touch_after(model.evaluator.pointer, packed, step, self._memory))
+
+    def query_many(self, steps: ArrayLike, tool: str, **asked: Any) -> Touches:
+        """Return the force on a ``tool`` in n queries one after the other, each its step (s) after the one before.
+
+        The same as n calls of :meth:`query`, in one call of C; ``asked`` as in ``Model.query_many``.
+
+        Raises:
+            TypeError, ValueError: as ``Model.query_many``.
+        """
+        model = self.model
+        queries, times = in_order(packed_each(Query(tool, **asked), model.young, model.poisson), steps)
+        queries, found = many(queries)
+        library().epsmesh_touch_each_after(
+            model.evaluator.pointer,
+            len(queries),
+            queries.ctypes.data,
+            times.ctypes.data,
+            self._memory,
+            found.ctypes.data,
+        )
+        return touches_of(found)

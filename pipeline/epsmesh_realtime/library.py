@@ -48,11 +48,13 @@ _FUNCTIONS = {
     "epsmesh_between": (None, c_void_p, c_double, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p),
     "epsmesh_memory_begin": (None, c_void_p, c_void_p, c_size_t),
     "epsmesh_touch_after": (TouchInC, c_void_p, c_void_p, c_double, c_void_p),
+    "epsmesh_touch_each_after": (None, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p, c_void_p),
     "epsmesh_surface_far": (None, c_void_p, *_PLACE, c_double, c_void_p),
     "epsmesh_surface_press": (TouchInC, c_void_p, c_void_p, c_void_p, c_void_p),
     "epsmesh_patch_make_of": (c_int, c_void_p, c_void_p, c_void_p, c_double),
     "epsmesh_patch_deepest": (c_double, c_void_p),
     "epsmesh_patch_touch": (TouchInC, c_void_p, c_void_p, c_void_p, c_double),
+    "epsmesh_patch_touch_each": (None, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p),
 }
 
 

@@ -88,15 +88,19 @@ class Model:
         """Return the answer of a ``query``."""
         return self.evaluator.touch(query.packed(self.young, self.poisson))
 
-    def query_each(self, tool: str, **asked: Any) -> Touches:
-        """Return the force on a ``tool`` in n queries, each by itself, in one call of C.
+    def query_many(self, tool: str, *, threads: int = 1, **asked: Any) -> Touches:
+        """Return the force on a ``tool`` in n queries, each by itself, in one call of C for each of ``threads``.
 
-        ``asked`` are the keywords of a query; numbers may be arrays (n,), places and directions arrays (n, 3).
+        ``asked`` are the keywords of a query; numbers may be arrays (n,), places and directions arrays (n, 3). Answers
+        are those of n single queries, bit for bit, of the sudden touch where tissue relaxes. Python runs meanwhile.
 
         Raises:
-            TypeError: if a keyword is unknown, or place or depth is missing; ValueError: if shapes do not go together.
+            TypeError: if a keyword is unknown, or place or depth is missing.
+            ValueError: if shapes do not go together, or ``threads`` is not positive.
         """
-        return self.evaluator.touch_each(packed_each(Query(tool, **asked), self.young, self.poisson))
+        return self.evaluator.touch_each(packed_each(Query(tool, **asked), self.young, self.poisson), threads)
+
+    query_each = query_many  # the name of the first release
 
     def query_all(
         self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None

@@ -7,7 +7,7 @@ from struct import Struct, error
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 # Tools with their contacts, and their numbers in C.
 _SHAPES = {
@@ -110,6 +110,19 @@ def packed_each(query: Query, young: float, poisson: float) -> NDArray[Any]:
     for name, value in (values | vectors).items():
         found[name] = value
     return found
+
+
+def in_order(queries: NDArray[Any], numbers: ArrayLike) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    """Return packed queries (n,) and as many ``numbers`` beside them, one for all or (n,).
+
+    Raises:
+        ValueError: if their shapes do not go together.
+    """
+    shape = np.broadcast_shapes(queries.shape, np.shape(numbers))
+    if len(shape) > 1:
+        raise ValueError("numbers beside queries have shape (n,)")
+    whole = np.broadcast_to(np.asarray(numbers, dtype=float), shape)
+    return np.broadcast_to(queries, shape), np.ascontiguousarray(whole)
 
 
 def _triple(given: Iterable[float]) -> tuple[float, float, float]:

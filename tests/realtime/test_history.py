@@ -193,3 +193,18 @@ def test_a_file_has_the_relaxation_and_none_that_gains_modulus(tmp_path):
         write_model(tmp_path / "model.epsm", replace(random_model(), relaxation=wrong), {}, {})
         with pytest.raises(ModelError, match="relaxation"):
             read(tmp_path / "model.epsm")
+
+
+@pytest.mark.parametrize("tool", [DISC, BALL])
+def test_many_queries_in_order_are_those_of_many_calls(tool):
+    times = np.linspace(0.1, 3.0, 30)
+    depths = np.interp(times, (0, 1, 2, 3), (0, 3e-4, 3e-4, -1e-5))
+    known = pressed(tool, times, depths)
+    found = History(relaxing()).query_many(np.diff(times, prepend=0.0), **tool, depth=depths)
+    assert {*found.status} == {"ok", "no contact"}
+    assert [*found.status] == [touch.status for touch in known]
+    np.testing.assert_array_equal(found.force, forces(known))
+    np.testing.assert_array_equal(found.force_error, [touch.force_error for touch in known])
+    for steps in (np.zeros(29), np.zeros((30, 1))):
+        with pytest.raises(ValueError, match="shape"):
+            History(relaxing()).query_many(steps, **tool, depth=depths)

@@ -283,18 +283,24 @@ def test_a_model_has_the_numbers_of_its_file(tmp_path):
             pack({name: values})
 
 
+@pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True, "is_even": False}])
 @pytest.mark.parametrize(("name", "sizes"), TOOLS)
-def test_many_queries_in_one_call_are_those_of_many_calls(name, sizes):
-    model, rng, count = random_model(), np.random.default_rng(3), 60
-    places = np.column_stack([rng.uniform(-0.031, 0.031, (count, 2)) * (1, 0.8), np.zeros(count)])
+def test_many_queries_in_one_call_are_those_of_many_calls(name, sizes, kind):
+    model, rng, count = random_model(**kind), np.random.default_rng(3), 60
+    x, y = (rng.uniform(-0.031, 0.031, (count, 2)) * (1, 0.8)).T
+    places = np.column_stack([x, y, [model.spot(*place).height for place in zip(x, y, strict=True)]])
     varied = {
         "at": places,
         "depth": rng.uniform(-1e-5, 4e-4, count),
-        "axis": rng.integers(0, 2, (count, 3)) * (0, 0, -1),
     }
+    if "curved" not in kind:
+        varied["axis"] = rng.integers(0, 2, (count, 3)) * (0, 0, -1)
     asked = sizes | ({"along": rng.standard_normal((count, 3))} if name == "blade" else {})
-    touches = model.query_each(name, **varied, **asked, poisson=0.4)
-    assert set(touches.status) >= {"ok", "no contact", "input"}
+    touches = model.query_many(name, **varied, **asked, poisson=0.4)
+    assert set(touches.status) >= {"ok", "no contact", "outside" if "curved" in kind else "input"}
+    side_by_side = model.query_many(name, **varied, **asked, poisson=0.4, threads=3)
+    np.testing.assert_array_equal(side_by_side.force, touches.force)
+    np.testing.assert_array_equal(side_by_side.status, touches.status)
     for number, status in enumerate(touches.status):
         own = {key: np.asarray(value)[number] if np.ndim(value) else value for key, value in (varied | asked).items()}
         touch = model.query(name, **own, poisson=0.4)
@@ -315,9 +321,15 @@ def test_packed_queries_may_have_gaps_and_are_nothing_else():
 
 
 def test_queries_whose_shapes_do_not_go_together_are_refused():
+    with pytest.raises(ValueError, match="threads must be at least 1, not 0"):
+        random_model().query_many("disc", at=AT, depth=1e-4, radius=1e-3, threads=0)
+    assert random_model().query_many("disc", at=np.zeros((0, 3)), depth=1e-4, radius=1e-3, threads=2).force.shape == (
+        0,
+        3,
+    )
     for at, depth in ((np.zeros((4, 3)), np.zeros(5)), (np.zeros((4, 2)), 1e-4), (np.zeros((2, 2, 3)), 1e-4)):
         with pytest.raises(ValueError, match="shape"):
-            random_model().query_each("disc", at=at, depth=depth, radius=1e-3)
+            random_model().query_many("disc", at=at, depth=depth, radius=1e-3)
 
 
 @pytest.mark.parametrize("kind", [{}, {"is_round": True}, {"curved": True}])

@@ -67,7 +67,7 @@ def test_a_closed_loop_does_no_work(kind):
     model, angle, weight = large(**kind), 2 * pi * np.arange(64) / 64, 2 * pi / 64
     x, y, depths = 0.008 + 0.006 * np.cos(angle), 0.01 + 0.005 * np.sin(angle), 1e-3 * (2 + np.sin(angle + 1))
     at = np.column_stack([x, y, 0 * x])
-    forces = model.query_each("sphere", radius=RADIUS, at=at, depth=depths).force
+    forces = model.query_many("sphere", radius=RADIUS, at=at, depth=depths).force
     assert np.isfinite(forces).all()
     tips = at - depths[:, None] * np.array([0.0, 0.0, 1.0])
     waves = np.fft.rfftfreq(64, 1 / 64)

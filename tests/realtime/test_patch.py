@@ -139,3 +139,16 @@ def test_a_tip_whose_height_fails_has_no_force():
     touch = patch.query(at=AT, depth=1e-4)
     assert touch.status == "large"
     assert np.isnan(touch.force).all()
+
+
+def test_many_queries_of_a_tip_are_those_of_many_calls():
+    model, rng = random_model(), np.random.default_rng(8)
+    at = np.column_stack([rng.uniform(-0.02, 0.02, (12, 2)), np.zeros(12)])
+    depth, turn = rng.uniform(-5e-5, 4e-4, 12), rng.uniform(0, 6, 12)
+    one = Patch(model, LONG)
+    known = [one.query(at=at[k], depth=depth[k], turn=turn[k]) for k in range(12)]
+    found = Patch(model, LONG).query_many(at=at, depth=depth, turn=turn)
+    assert {*found.status} == {"ok", "no contact"}
+    assert [*found.status] == [touch.status for touch in known]
+    np.testing.assert_array_equal(found.force, [touch.force for touch in known])
+    np.testing.assert_array_equal(found.stiffness, [touch.stiffness for touch in known])

@@ -44,6 +44,10 @@ double epsmesh_patch_deepest(const epsmesh_patch *patch);
 epsmesh_touch epsmesh_patch_touch(epsmesh_patch *patch, const epsmesh_model *model, const epsmesh_query *query,
                                   double turn);
 
+/* Answer `count` queries with their turns one after the other, as so many calls do. */
+void epsmesh_patch_touch_each(epsmesh_patch *patch, const epsmesh_model *model, size_t count,
+                              const epsmesh_query *queries, const double *turns, epsmesh_touch *touches);
+
 #ifdef __cplusplus
 }
 #endif

@@ -44,6 +44,10 @@ void epsmesh_memory_begin(epsmesh_memory *memory, epsmesh_moment *moments, size_
 epsmesh_touch epsmesh_touch_after(const epsmesh_model *model, const epsmesh_query *query, double step,
                                   epsmesh_memory *memory);
 
+/* Answer `count` queries, each so many `steps` (s) after the one before, as so many calls do. */
+void epsmesh_touch_each_after(const epsmesh_model *model, size_t count, const epsmesh_query *queries, const double *steps,
+                              epsmesh_memory *memory, epsmesh_touch *touches);
+
 #ifdef __cplusplus
 }
 #endif

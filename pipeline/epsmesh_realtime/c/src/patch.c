@@ -353,3 +353,9 @@ epsmesh_touch epsmesh_patch_touch(epsmesh_patch *t, const epsmesh_model *m, cons
         return all(EPSMESH_DAMAGED, (double)NAN);
     return found;
 }
+
+void epsmesh_patch_touch_each(epsmesh_patch *t, const epsmesh_model *m, size_t count, const epsmesh_query *q,
+                              const double *turns, epsmesh_touch *touches) {
+    size_t i;
+    for (i = 0; i < count; i++) touches[i] = epsmesh_patch_touch(t, m, &q[i], turns[i]);
+}

@@ -256,3 +256,9 @@ epsmesh_touch epsmesh_touch_after(const epsmesh_model *m, const epsmesh_query *q
     if (memory->phase == EPSMESH_RESTED && q->depth <= TOUCHING) return epsmesh_touch_at(m, &asked);
     return grows(q) ? after_growing(m, &asked, step, memory) : after_same(m, &asked, step, memory);
 }
+
+void epsmesh_touch_each_after(const epsmesh_model *m, size_t count, const epsmesh_query *q, const double *steps,
+                              epsmesh_memory *memory, epsmesh_touch *touches) {
+    size_t i;
+    for (i = 0; i < count; i++) touches[i] = epsmesh_touch_after(m, &q[i], steps[i], memory);
+}
