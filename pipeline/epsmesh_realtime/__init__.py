@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from epsmesh_realtime.file import ModelError
+    from epsmesh_realtime.gradient import Gradient
     from epsmesh_realtime.history import History
     from epsmesh_realtime.library import BuildError, source_files, sources
     from epsmesh_realtime.model import Model, read
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuildError",
+    "Gradient",
     "History",
     "Model",
     "ModelError",
@@ -34,6 +36,7 @@ __all__ = [
 
 _MODULES = {
     "file": ("ModelError",),
+    "gradient": ("Gradient",),
     "history": ("History",),
     "library": ("BuildError", "source_files", "sources"),
     "model": ("Model", "read"),
