@@ -25,6 +25,6 @@ class BuildPackages(realtime["BuildPackages"]):
 
 
 setup(
-    ext_modules=realtime["libraries"](FOLDER),
+    ext_modules=[realtime["library"](FOLDER)],
     cmdclass=realtime["COMMANDS"] | {"build_py": BuildPackages},
 )

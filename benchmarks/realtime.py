@@ -25,7 +25,7 @@ from benchmarks.tables import markdown
 from benchmarks.touches import NAMES, add_groups, flat_kinds, groups_of
 from epsmesh.arrays import FloatArray
 from epsmesh.study.read import read_study
-from epsmesh_realtime import read
+from epsmesh_realtime import Insertion, read, read_path
 from epsmesh_realtime.export.checks import TOOLS, Check, with_bar
 from epsmesh_realtime.export.disc import Disc
 from epsmesh_realtime.export.export import export, write
@@ -114,7 +114,11 @@ def main() -> None:
     parser.add_argument("--models", default=",".join(STUDIES), help="some of them, by name")
     parser.add_argument("--minutes", type=float, default=inf, help="of processor time for full solves")
     parser.add_argument("--seconds", type=float, default=60.0, help="of a loop at 1 kHz")
+    parser.add_argument("--insertion", type=Path, help="the model of an insertion: print the time of its queries alone")
     asked = parser.parse_args()
+    if asked.insertion:
+        print(_of_insertion(asked.insertion))
+        return
     names, end = asked.models.split(","), time.process_time() + 60 * asked.minutes
     rounds = {name: _touches(name, asked.touches, asked.round) for name in names}
     while rounds and time.process_time() < end:
@@ -126,6 +130,19 @@ def main() -> None:
     if asked.seconds > 0:
         print()
         print(_latency(_FOLDER / f"{names[0]}.epsm", asked.seconds))
+
+
+def _of_insertion(path: Path) -> str:
+    """Return the time of 20,000 queries of an insertion from Python, back and forth in the channel and beyond."""
+    model = read_path(path)
+    tool, depths = Insertion(model), model.deepest * (0.5 + 0.375 * np.sin(np.arange(20_000) / 100))
+    took = []
+    for depth in depths.tolist():
+        begin = time.perf_counter()
+        tool.query(depth)
+        took.append(1e6 * (time.perf_counter() - begin))
+    p50, p99 = np.percentile(took, [50, 99])
+    return f"Python insertion p50 {p50:.1f}  p99 {p99:.1f} us"
 
 
 def _records(name: str, tools: str = "touches") -> Path:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from epsmesh_realtime.file import ModelError
-    from epsmesh_realtime.gradient import Gradient
+    from epsmesh_realtime.friction import Friction, Rubbing
     from epsmesh_realtime.history import History
+    from epsmesh_realtime.insertion import Insertion, PathModel, Resistance, Resistances, read_path
     from epsmesh_realtime.library import BuildError, source_files, sources
     from epsmesh_realtime.model import Model, read
     from epsmesh_realtime.patch import Patch, Tip
@@ -18,17 +19,23 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BuildError",
-    "Gradient",
+    "Friction",
     "History",
+    "Insertion",
     "Model",
     "ModelError",
     "Patch",
+    "PathModel",
     "Query",
+    "Resistance",
+    "Resistances",
+    "Rubbing",
     "Surface",
     "Tip",
     "Touch",
     "Touches",
     "read",
+    "read_path",
     "read_surface",
     "source_files",
     "sources",
@@ -36,8 +43,9 @@ __all__ = [
 
 _MODULES = {
     "file": ("ModelError",),
-    "gradient": ("Gradient",),
+    "friction": ("Friction", "Rubbing"),
     "history": ("History",),
+    "insertion": ("Insertion", "PathModel", "Resistance", "Resistances", "read_path"),
     "library": ("BuildError", "source_files", "sources"),
     "model": ("Model", "read"),
     "patch": ("Patch", "Tip"),

@@ -27,7 +27,7 @@ MOST_RELAXING = 6
 _TOUCH = Struct("@i6d")
 _TOUCHES = np.dtype([("status", np.int32), ("numbers", np.float64, 6)], align=True)
 _STATUSES = 16
-_FLAWS = (
+FLAWS = (
     "",
     "this is no real-time model of epsmesh",
     f"the file has another version than {VERSION}, which this program reads: export it again",
@@ -86,13 +86,13 @@ class Evaluator:
         Raises:
             ModelError: if they are no model, of another version, or damaged.
         """
-        self._data = _aligned(data)  # C points into it
+        self._data = aligned(data)  # C points into it
         self._model = ctypes.create_string_buffer(size_of(0))
         self._c = library()
         if self._c.epsmesh_load(self._model, self._data.ctypes.data, len(data)):
             name = ctypes.c_char_p()
             flaw = self._c.epsmesh_flaw_of(self._model, ctypes.byref(name))
-            raise ModelError(_FLAWS[flaw].format(name=(name.value or b"").decode()))
+            raise ModelError(FLAWS[flaw].format(name=(name.value or b"").decode()))
 
     @staticmethod
     def of(arrays: Mapping[str, ArrayLike]) -> "Evaluator":
@@ -125,12 +125,13 @@ class Evaluator:
             TypeError: if they are something else; ValueError: if ``threads`` is not positive.
         """
         queries, found = many(queries)
-        side_by_side(lambda part: self.answer(queries[part], found[part]), len(queries), threads)
-        return touches_of(found)
 
-    def answer(self, queries: NDArray[Any], found: NDArray[Any]) -> None:
-        """Put the answers of ``queries`` into ``found``, both as :func:`many` returns them."""
-        self._c.epsmesh_touch_each(self._model, len(queries), queries.ctypes.data, found.ctypes.data)
+        def answer(part: slice) -> None:
+            mine, answers = queries[part], found[part]
+            self._c.epsmesh_touch_each(self._model, len(mine), mine.ctypes.data, answers.ctypes.data)
+
+        side_by_side(answer, len(queries), threads)
+        return touches_of(found)
 
     def touch_all(self, queries: Sequence[bytes]) -> list[Touch]:
         """Return the answers of tools that press at once."""
@@ -248,6 +249,7 @@ def side_by_side(work: Callable[[slice], None], count: int, threads: int) -> Non
         list(pool.map(work, parts))
 
 
-def _aligned(data: bytes) -> NDArray[np.uint8]:
+def aligned(data: bytes) -> NDArray[np.uint8]:
+    """Return bytes at an address that is a multiple of 8."""
     found = np.frombuffer(data, np.uint8)
     return found if found.ctypes.data % 8 == 0 else found.copy()

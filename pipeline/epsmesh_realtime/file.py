@@ -110,6 +110,11 @@ def pack(arrays: Mapping[str, ArrayLike]) -> bytes:
     return b"".join([head.tobytes(), entries.tobytes(), *parts])
 
 
+def is_path(data: bytes) -> bool:
+    """Return whether the bytes of a file are those of an insertion's model (`epsmesh_realtime.insertion`)."""
+    return b"path_advance" in data[: _HEAD.itemsize + 16 * _ARRAY.itemsize]
+
+
 def unpack(data: bytes) -> dict[str, NDArray[Any]]:
     """Return the arrays of a file that the evaluator has loaded, by name, as views of ``data``.
 

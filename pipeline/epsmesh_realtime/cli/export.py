@@ -26,6 +26,7 @@ _FMU = "docs/guide/realtime.md"
 # The range of --accuracy: tables and formulas allow no less, and more is of no use.
 _ACCURACIES = (0.002, 0.2)
 _MOST_CHECKS = 1000
+DEFAULT_ACCURACY = "1%"
 # The error bars must cover the errors of this share of the test touches.
 _COVERED = 0.95
 
@@ -39,7 +40,9 @@ def export(
             show_default=False,
         ),
     ] = None,
-    accuracy: Annotated[str, typer.Option(help='Largest error of a force, against a full solve: "1%".')] = "1%",
+    accuracy: Annotated[
+        str, typer.Option(help='Largest error of a force, against a full solve: "1%".')
+    ] = DEFAULT_ACCURACY,
     output: Output = DEFAULT_OUTPUT,
     model: Annotated[
         Path | None,
@@ -61,6 +64,13 @@ def export(
             show_default=False,
         ),
     ] = None,
+    needle: Annotated[
+        bool,
+        typer.Option(
+            "--needle",
+            help="Of an insertion: also write parameters of needles, STUDY.sofa.py for SOFA, STUDY.imstk.h for iMSTK.",
+        ),
+    ] = False,
     evaluator: Annotated[
         Path | None,
         typer.Option(
@@ -77,11 +87,15 @@ def export(
     calibrate its error bar and test it. Under mpirun the ranks share the solves. Exit status 1: the bar covers the
     error of less than 95 % of the test touches.
 
+    A study with [probe.insertion] is exported as the model of its path. Its forces have the study's bars.
+
     Example: epsmesh export studies/quick.toml --accuracy 1% --model box.epsm
 
     Example: mpirun -n 2 epsmesh export studies/quick.toml
 
     Example: epsmesh export results/quick.epsm --fmu quick.fmu
+
+    Example: epsmesh export studies/needle-path.toml --needle
 
     Example: epsmesh export --evaluator simulator/epsmesh
     """
@@ -101,6 +115,21 @@ def export(
     wanted = _share(accuracy)
     file = by_name(file)
     (study,) = read_all([file])
+    if study.is_insertion:
+        if fmu is not None:
+            fail(of_option("--fmu", fmu, "has no insertions: a unit has a tool that presses", _FMU))
+        if accuracy != DEFAULT_ACCURACY:
+            fail(
+                of_option(
+                    "--accuracy", accuracy, "is that of the study's `mesh` for an insertion: leave it out", _HOWTO
+                )
+            )
+        from epsmesh_realtime.cli.insertion import export_insertion
+
+        export_insertion(study, file, output, model, needle=needle)
+        return
+    if needle:
+        fail(Fault("--needle: the study has no [probe.insertion]", file=str(file), key="--needle", howto=_HOWTO))
     path = model or output / f"{study.name}{MODEL_ENDING}"
     check_output(path, option="--output DIR` or `--model FILE")
     check_machine()

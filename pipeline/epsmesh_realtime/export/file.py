@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from epsmesh.arrays import FloatArray
 from epsmesh.files import atomic
 from epsmesh_realtime.evaluator import Evaluator
-from epsmesh_realtime.file import ModelError, pack, unpack
+from epsmesh_realtime.file import ModelError, is_path, pack, unpack
+from epsmesh_realtime.insertion import PathModel
 from epsmesh_realtime.model import Model, about
 from epsmesh_realtime.surface import SurfaceTable
 
@@ -35,6 +36,9 @@ _DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "surface_triangles": ("triangle", "corner"),
     "inside_points": ("inside_vertex", "component"),
     "inside_triangles": ("inside_triangle", "corner"),
+    "path_advance": ("knot", "column"),
+    "path_back": ("back_knot", "back_column"),
+    "path_punctures": ("puncture", "puncture_column"),
     "surface_modes": ("vertex", "component", "mode"),
     "surface_amounts": ("mode", "poisson_degree", "y_degree", "x_degree"),
 }
@@ -49,6 +53,7 @@ _UNITS = {
     "relaxation_time": "s",
     "aligned": "rad",
     "surface_amounts": "m/N Pa",
+    "path_slip": "m",
 }
 _CHECK = "check_"
 
@@ -76,7 +81,7 @@ def open_model(path: Path) -> xr.Dataset:
         ModelError: if it is no model, or damaged; OSError if it cannot be read.
     """
     data = path.read_bytes()
-    Evaluator(data)
+    PathModel(data) if is_path(data) else Evaluator(data)
     found = unpack(data)
     texts = about(found)
     found.pop("about", None)

@@ -118,7 +118,7 @@ def _refusal(case: Case, first: Case) -> str:
     if body != first.body:
         return "the study has several bodies, and a model has one: export a study of each"
     if any(axis.path == "probe.insertion" for axis in case.axes):
-        return "probe.insertion: a path has no real-time model: give a depth instead"
+        return "probe.insertion: a path has a model of its own, and this one is of touches: give a depth instead"
     if reason := obstacle("real-time model", case):
         return reason
     if reason := _large_refusal(case, first) or _relaxing_refusal(case, first):

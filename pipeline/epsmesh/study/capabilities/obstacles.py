@@ -107,7 +107,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "real-time model": {
         "given force": "probe.force: a real-time model has its force for every depth. Give a depth",
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
-        "friction": "probe.friction: real-time models have no friction. Omit it and export the frictionless force",
+        "friction": "probe.friction: real-time models are frictionless, `epsmesh.realtime.Friction` adds it. Omit it",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
         "terms": "[load], body.capsule: springs, capsules and other terms have no real-time model",
         "fibres": "{key}: fibres have a direction, and the half-space of a real-time model has none",
