@@ -25,6 +25,6 @@ class BuildPackages(realtime["BuildPackages"]):
 
 
 setup(
-    ext_modules=[realtime["library"](FOLDER)],
+    ext_modules=realtime["libraries"](FOLDER),
     cmdclass=realtime["COMMANDS"] | {"build_py": BuildPackages},
 )

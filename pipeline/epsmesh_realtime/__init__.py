@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from epsmesh_realtime.file import ModelError
     from epsmesh_realtime.friction import Friction, Rubbing
+    from epsmesh_realtime.gradient import Gradient
     from epsmesh_realtime.history import History
     from epsmesh_realtime.insertion import Insertion, PathModel, Resistance, Resistances, read_path
     from epsmesh_realtime.library import BuildError, source_files, sources
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BuildError",
     "Friction",
+    "Gradient",
     "History",
     "Insertion",
     "Model",
@@ -44,6 +46,7 @@ __all__ = [
 _MODULES = {
     "file": ("ModelError",),
     "friction": ("Friction", "Rubbing"),
+    "gradient": ("Gradient",),
     "history": ("History",),
     "insertion": ("Insertion", "PathModel", "Resistance", "Resistances", "read_path"),
     "library": ("BuildError", "source_files", "sources"),

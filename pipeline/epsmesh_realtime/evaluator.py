@@ -125,13 +125,12 @@ class Evaluator:
             TypeError: if they are something else; ValueError: if ``threads`` is not positive.
         """
         queries, found = many(queries)
-
-        def answer(part: slice) -> None:
-            mine, answers = queries[part], found[part]
-            self._c.epsmesh_touch_each(self._model, len(mine), mine.ctypes.data, answers.ctypes.data)
-
-        side_by_side(answer, len(queries), threads)
+        side_by_side(lambda part: self.answer(queries[part], found[part]), len(queries), threads)
         return touches_of(found)
+
+    def answer(self, queries: NDArray[Any], found: NDArray[Any]) -> None:
+        """Put the answers of ``queries`` into ``found``, both as :func:`many` returns them."""
+        self._c.epsmesh_touch_each(self._model, len(queries), queries.ctypes.data, found.ctypes.data)
 
     def touch_all(self, queries: Sequence[bytes]) -> list[Touch]:
         """Return the answers of tools that press at once."""

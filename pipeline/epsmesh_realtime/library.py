@@ -1,4 +1,7 @@
-"""The evaluator in C as a shared library: the installed one, or one compiled from the sources of a checkout."""
+"""The evaluator in C as a shared library: the installed one, or one compiled from the sources of a checkout.
+
+Its derivatives are a library of their own, in C++.
+"""
 
 import ctypes
 import hashlib
@@ -10,15 +13,16 @@ import subprocess
 import sysconfig
 from contextlib import suppress
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import time
+from typing import Any
 
 _PACKAGE = Path(__file__).resolve().parent
 _SOURCES = _PACKAGE / "c"
-_FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared")
-_COMPILERS = ("cc", "gcc", "clang")
+_COMPILERS = {"C": ("cc", "gcc", "clang"), "C++": ("c++", "g++", "clang++")}
 # s: another process may be about to load a younger library of other sources.
 _KEPT = 86400.0
 # Sizes (bytes) of a query and of a touch, as `query.py` and `evaluator.py` pack them.
@@ -69,6 +73,44 @@ class BuildError(RuntimeError):
     """The evaluator is not built, and cannot be."""
 
 
+@dataclass(frozen=True)
+class _Part:
+    """A library: ``name`` of its installed file, what compiles it, ``package`` and ``variable`` of a compiler."""
+
+    name: str
+    source: str
+    language: str
+    flags: tuple[str, ...]
+    package: str
+    variable: str
+    what: str
+
+
+_EVALUATOR = _Part("_evaluator", "epsmesh.c", "C", ("-std=c99", "-O2"), "gcc", "CC", "real-time models are evaluated")
+_GRADIENT = _Part(
+    "_gradient",
+    "epsmesh_gradient.cpp",
+    "C++",
+    ("-std=c++11", "-O3"),
+    "g++",
+    "CXX",
+    "derivatives of forces are computed",
+)
+
+
+@cache
+def gradients() -> Any:
+    """Return epsmesh_gradient of the derivatives' library.
+
+    Raises:
+        BuildError: as :func:`library`.
+    """
+    function = _opened(_GRADIENT).epsmesh_gradient
+    function.restype = None
+    function.argtypes = (c_void_p, c_size_t, c_void_p, c_void_p, c_size_t, c_void_p, c_void_p, c_void_p)
+    return function
+
+
 @cache
 def library() -> ctypes.CDLL:
     """Return the evaluator with the types of its functions; a checkout's is compiled if its sources are new.
@@ -76,11 +118,7 @@ def library() -> ctypes.CDLL:
     Raises:
         BuildError: if there is neither a library nor a compiler, or if compiling or loading fails.
     """
-    path = _installed() or _built()
-    try:
-        found = ctypes.CDLL(str(path))
-    except OSError as problem:
-        raise BuildError(f"the evaluator in C cannot be loaded: {problem}") from problem
+    found = _opened(_EVALUATOR)
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments
@@ -106,7 +144,7 @@ def sources() -> Path:
 
 def source_files() -> list[Path]:
     """Return the files in that folder, relative to it, without tests."""
-    patterns, folder = ("*.[ch]", "src/*.c", "examples/*", "fmu/*.c"), sources()
+    patterns, folder = ("*.[ch]", "*.cpp", "src/*.c", "examples/*", "fmu/*.c"), sources()
     found = (path for pattern in patterns for path in sorted(folder.glob(pattern)))
     return [path.relative_to(folder) for path in found if path.is_file() and not path.name.startswith("test_")]
 
@@ -116,28 +154,37 @@ def _is_checkout() -> bool:
     return (_PACKAGE / "pyproject.toml").is_file()
 
 
-def _installed() -> Path | None:
+def _opened(part: _Part) -> ctypes.CDLL:
+    path = _installed(part) or _built(part)
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as problem:
+        raise BuildError(f"the evaluator in {part.language} cannot be loaded: {problem}") from problem
+
+
+def _installed(part: _Part) -> Path | None:
     """Return the library that `pip install` built; a checkout's sources take precedence, as they may be newer."""
-    return None if _is_checkout() else next(iter(sorted(_PACKAGE.glob("_evaluator*"))), None)
+    return None if _is_checkout() else next(iter(sorted(_PACKAGE.glob(f"{part.name}*"))), None)
 
 
-def _built() -> Path:
+def _built(part: _Part = _EVALUATOR) -> Path:
     """Return the library of the checkout's sources."""
     if not _is_checkout():
         raise BuildError(
-            "the evaluator in C is not part of this installation, since there was no C compiler: install it again, "
-            "with one"
+            f"the evaluator in {part.language} is not part of this installation, since there was no {part.language} "
+            "compiler: install it again, with one"
         )
-    files = sorted([*_SOURCES.glob("epsmesh*.[ch]"), *_SOURCES.glob("src/*.c")])
-    compiler = _compiler()
+    files = sorted([*_SOURCES.glob("epsmesh*.[ch]*"), *_SOURCES.glob("src/*.c")])
+    compiler = _compiler(part)
     texts = b"\0".join([file.read_bytes() for file in files])
-    name = hashlib.sha256(texts + repr((_FLAGS, compiler)).encode()).hexdigest()[:16]
+    name = hashlib.sha256(texts + repr((part, compiler)).encode()).hexdigest()[:16]
     # Several machines, and systems in containers, may share a checkout.
     machine = "-".join(filter(None, [sysconfig.get_platform(), *platform.libc_ver()]))
-    path = _PACKAGE / ".built" / f"epsmesh-{machine}-{name}.so"
+    kind = f"{Path(part.source).stem}-{machine}"
+    path = _PACKAGE / ".built" / f"{kind}-{name}.so"
     if not path.exists():
-        _compile(compiler, path)
-        _remove_old(path.parent, f"epsmesh-{machine}-*.so")
+        _compile(part, compiler, path)
+        _remove_old(path.parent, f"{kind}-*.so")
     return path
 
 
@@ -149,27 +196,31 @@ def _remove_old(folder: Path, pattern: str) -> None:
                 path.unlink()
 
 
-def _compiler() -> list[str]:
-    """Return the C compiler's command, [] if there is none."""
-    if asked := os.environ.get("CC"):
+def _compiler(part: _Part) -> list[str]:
+    """Return the compiler's command, [] if there is none."""
+    if asked := os.environ.get(part.variable):
         return shlex.split(asked)
-    return next(([name] for name in _COMPILERS if shutil.which(name)), [])
+    return next(([name] for name in _COMPILERS.get(part.language, ()) if shutil.which(name)), [])
 
 
-def _compile(compiler: list[str], path: Path) -> None:
+def _compile(part: _Part, compiler: list[str], path: Path) -> None:
     if not compiler or not shutil.which(compiler[0]):
         raise BuildError(
-            "real-time models are evaluated in C, and there is no C compiler: install one (on Debian: apt-get install "
-            "gcc), or set CC"
+            f"{part.what} in {part.language}, and there is no {part.language} compiler: install one (on Debian: "
+            f"apt-get install {part.package}), or set {part.variable}"
         )
     try:
         path.parent.mkdir(exist_ok=True)
         with TemporaryDirectory(dir=path.parent) as folder:  # other processes see a complete file or none
             made = Path(folder) / "made.so"
-            command = [*compiler, *_FLAGS, str(_SOURCES / "epsmesh.c"), "-o", str(made), "-lm"]
+            command = [*compiler, *part.flags, "-fPIC", "-shared", str(_SOURCES / part.source), "-o", str(made), "-lm"]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
-                raise BuildError(f"the evaluator in C does not compile: {' '.join(command)}\n{done.stderr.strip()}")
+                raise BuildError(
+                    f"the evaluator in {part.language} does not compile: {' '.join(command)}\n{done.stderr.strip()}"
+                )
             made.replace(path)
     except OSError as problem:
-        raise BuildError(f"the evaluator in C cannot be built in {path.parent}: {problem.strerror}") from problem
+        raise BuildError(
+            f"the evaluator in {part.language} cannot be built in {path.parent}: {problem.strerror}"
+        ) from problem

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epsmesh_realtime.evaluator import MOST_TOOLS, Array, Evaluator, Spot
 from epsmesh_realtime.file import ModelError, is_path, unpack
+from epsmesh_realtime.gradient import Gradient, gradient
 from epsmesh_realtime.query import Query, packed_each
 from epsmesh_realtime.table import Face, Near, Pairs, Table
 from epsmesh_realtime.touch import Touch, Touches
@@ -101,6 +102,22 @@ class Model:
         return self.evaluator.touch_each(packed_each(Query(tool, **asked), self.young, self.poisson), threads)
 
     query_each = query_many  # the name of the first release
+
+    def gradient(self, tool: str, *, by: Sequence[str] = ("at", "depth"), threads: int = 1, **asked: Any) -> Gradient:
+        """Return the force on a ``tool`` in n queries, and its derivatives with the numbers named in ``by``.
+
+        These are place, depth, E and ν (``at``, ``depth``, ``young``, ``poisson``), and the tool's sizes. They are
+        exact derivatives of the evaluator's formulas. ``asked`` as in :meth:`query_many`.
+
+        Raises:
+            ValueError: if the force is no function of a number: of the axis, of ν in a model of one ν, of another
+                tool's size; or if shapes do not go together.
+            TypeError: if a keyword is unknown, or place or depth is missing.
+            BuildError: if the derivatives' library is not built, and cannot be: it is C++.
+        """
+        query, (low, high) = Query(tool, **asked), self.table.poisson
+        tissue = (self.young, self.poisson)
+        return gradient(self.evaluator, query, by, *tissue, is_fixed=low == high, threads=threads)
 
     def query_all(
         self, tools: Sequence[Mapping[str, Any]], *, young: float | None = None, poisson: float | None = None

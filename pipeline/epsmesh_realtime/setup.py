@@ -49,15 +49,27 @@ class Wheel(bdist_wheel):
         return "py3", "none", super().get_tag()[2]
 
 
-def library(folder: str | Path = ".") -> Extension:
-    """Return what setuptools builds from the sources in ``folder``."""
+def libraries(folder: str | Path = ".") -> list[Extension]:
+    """Return what setuptools builds from the sources in ``folder``: the evaluator, and its derivatives."""
     # Where there is no compiler, the package is installed without it, and says so when a model is read.
-    flags = ["-std=c99", "-O2"]
-    source = (Path(folder) / "c" / "epsmesh.c").as_posix()
-    return Extension("epsmesh_realtime._evaluator", [source], extra_compile_args=flags, optional=True)
+    parts = (
+        ("_evaluator", "epsmesh.c", ["-std=c99", "-O2"], None),
+        ("_gradient", "epsmesh_gradient.cpp", ["-std=c++11", "-O3"], "c++"),
+    )
+    sources = Path(folder) / "c"
+    return [
+        Extension(
+            f"epsmesh_realtime.{name}",
+            [(sources / source).as_posix()],
+            extra_compile_args=flags,
+            language=language,
+            optional=True,
+        )
+        for name, source, flags, language in parts
+    ]
 
 
 COMMANDS = {"build_ext": BuildLibrary, "build_py": BuildPackages, "bdist_wheel": Wheel}
 
 if __name__ == "__main__":
-    setup(ext_modules=[library()], cmdclass=COMMANDS)
+    setup(ext_modules=libraries(), cmdclass=COMMANDS)

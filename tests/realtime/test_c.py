@@ -17,7 +17,7 @@ from epsmesh_realtime.table import Near
 from tests.realtime.synthetic import random_model, random_surface
 
 SOURCES = Path(__file__).parents[2] / "pipeline" / "epsmesh_realtime" / "c"
-STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")
+STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 PARTS = sorted(SOURCES.glob("src/*.c"))
 _TIPS = """
 #include "epsmesh.h"
@@ -63,11 +63,19 @@ def test_parts_are_short_and_names_are_those_of_the_headers(tmp_path):
     assert {line.split()[-1].split("_")[0] for line in listed.stdout.decode().splitlines()} == {"epsmesh"}
 
 
-@pytest.mark.skipif(shutil.which("c++") is None, reason="there is no C++ compiler")
-def test_it_is_cpp_as_well(tmp_path):
-    strict = ("-std=c++11", *STRICT[1:])
-    for name in ("epsmesh.c", "test_epsmesh.c"):
-        compiled("c++", *strict, "-x", "c++", "-c", SOURCES / name, "-o", tmp_path / f"{name}.o")
+@pytest.mark.parametrize(
+    "compiler",
+    ["gcc -std=c99", "clang -std=c99", *(f"{cpp} -std=c++{year}" for cpp in ("g++", "clang++") for year in (11, 17))],
+)
+def test_it_is_c_and_cpp_without_a_warning(tmp_path, compiler):
+    name, standard = compiler.split()
+    if shutil.which(name) is None:
+        pytest.skip(f"there is no {name}")
+    is_cpp = "++" in name
+    programs = ("epsmesh.c", "test_epsmesh.c", "latency.c", "drag.c", *(["epsmesh_gradient.cpp"] if is_cpp else []))
+    for program in programs:
+        language = ("-x", "c++") if is_cpp else ()
+        compiled(name, standard, *STRICT[1:], *language, "-c", SOURCES / program, "-o", tmp_path / "made.o")
 
 
 def test_tools_at_once_are_of_one_tissue_and_not_too_many():
@@ -125,7 +133,7 @@ def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, near):
 def test_without_a_compiler_a_sentence_says_what_to_install(tmp_path, monkeypatch, compiler, words):
     monkeypatch.setattr(built, "_PACKAGE", tmp_path)
     (tmp_path / "pyproject.toml").touch()
-    monkeypatch.setattr(built, "_COMPILERS", ())
+    monkeypatch.setattr(built, "_COMPILERS", {})
     monkeypatch.delenv("CC", raising=False)
     if compiler:
         monkeypatch.setenv("CC", compiler)

@@ -34,7 +34,7 @@ static double drawn(unsigned long *state) {
 static double wave_at(const wave *w, double t) {
     double sum = 0;
     int i;
-    for (i = 0; i < WAVES; i++) sum += w->size[i] * sin(2 * PI_ * (i + 1) * t / LONGEST + w->phase[i]);
+    for (i = 0; i < WAVES; i++) sum += w->size[i] * sin(2 * PI_ * (i + 1) * t / (double)LONGEST + w->phase[i]);
     return sum / w->most;
 }
 
@@ -42,7 +42,7 @@ static void wave_make(wave *w, unsigned long *state) {
     int i;
     double t, most = 0;
     for (i = 0; i < WAVES; i++) w->size[i] = 2 * drawn(state) - 1, w->phase[i] = 2 * PI_ * drawn(state);
-    for (w->most = 1, t = 0; t < LONGEST; t += 0.01) most = fmax(most, fabs(wave_at(w, t)));
+    for (w->most = 1, t = 0; t < (double)LONGEST; t += 0.01) most = fmax(most, fabs(wave_at(w, t)));
     w->most = 1.01 * most;
 }
 

@@ -54,8 +54,8 @@ static double ask_after(int kind) {
         for (i = 0; i < 4 && !model.relaxing; i++) relaxing.share[i] = SHARES[i], relaxing.time[i] = TIMES[i];
     }
     if (number == 0) epsmesh_memory_begin(&memories[which], moments[which], STROKE + 8);
-    if (number < STROKE) query.depth *= (double)(number + 1) / STROKE;
-    if (number >= 2 * STROKE) query.depth *= (double)(3 * STROKE - number) / STROKE;
+    if (number < STROKE) query.depth *= (double)(number + 1) / (double)STROKE;
+    if (number >= 2 * STROKE) query.depth *= (double)(3 * STROKE - number) / (double)STROKE;
     return epsmesh_touch_after(&relaxing, &query, 1e-3, &memories[which]).force[2];
 }
 

@@ -25,29 +25,29 @@
 /* `aside` is the slope of the energy with x and y; or, if the tool `sticks`, a reaction along the face: components along
  * axes that are turned by the least angle from the body's to the normal. */
 typedef struct {
-    double force, aside[2], stiffness, radius, mean_square;
-    double share; /* relative change of F, per such change of the half-space's F at a depth */
+    real force, aside[2], stiffness, radius, mean_square;
+    real share; /* relative change of F, per such change of the half-space's F at a depth */
     int sticks;
 } contact;
 
 typedef struct {
-    double depth, slope, force, square, growth, compliance, near_compliance, widened;
+    real depth, slope, force, square, growth, compliance, near_compliance, widened;
 } pressed;
 
-static double cube(double x) { return x * x * x; }
-static double fifth(double x) { return x * x * x * x * x; }
+static real cube(real x) { return x * x * x; }
+static real fifth(real x) { return x * x * x * x * x; }
 
-static double tangent(double a, const place *p) {
+static real tangent(real a, const place *p) {
     return 0.5 / (p->plane * a) + p->c + a * a / 3 * p->h - 2.0 / 45 * p->plane * p->h * p->h * fifth(a);
 }
 
-static contact press_disc(double a, double depth, const place *p) {
-    double stiff = p->plane, h = p->h;
+static contact press_disc(real a, real depth, const place *p) {
+    real stiff = p->plane, h = p->h;
     contact k;
     int i;
     k.force = depth / (tangent(a, p) - 4.0 / 3 * stiff * cube(a) * p->tilt);
     for (i = 0; i < 2; i++) {
-        double slope = p->slope_c[i] + p->slope_h[i] * (a * a / 3 - 4.0 / 45 * stiff * h * fifth(a));
+        real slope = p->slope_c[i] + p->slope_h[i] * (a * a / 3 - 4.0 / 45 * stiff * h * fifth(a));
         k.aside[i] = 0.5 * k.force * k.force * (slope - 4.0 / 3 * stiff * cube(a) * p->slope_tilt[i]);
     }
     k.stiffness = k.force / depth, k.radius = a, k.share = 1, k.sticks = 0;
@@ -56,15 +56,15 @@ static contact press_disc(double a, double depth, const place *p) {
 }
 
 /* D(s), D'(s), and the integrals of D and s^2 D from 0 to s */
-static void profile(const epsmesh_query *tool, int is_paraboloid, double s, double out[4]) {
+static void profile(const request *tool, int is_paraboloid, real s, real out[4]) {
     if (is_paraboloid) {
-        double bend = 1 / tool->radius;
+        real bend = 1 / tool->radius;
         out[0] = bend * s * s, out[1] = 2 * bend * s, out[2] = bend * cube(s) / 3, out[3] = bend * fifth(s) / 5;
     } else if (tool->shape == EPSMESH_SPHERE) {
-        double big = tool->radius, t = (s / big) * (s / big), power = t, sum[4] = {0, 0, 0, 0};
+        real big = tool->radius, t = (s / big) * (s / big), power = t, sum[4] = {0, 0, 0, 0};
         int k;
         for (k = 0; k < TERMS; k++) {
-            double term = power / (2 * k + 1);
+            real term = power / (2 * k + 1);
             sum[0] += term, sum[1] += (2 * k + 2) * term;
             sum[2] += term / (2 * k + 3), sum[3] += term / (2 * k + 5);
             if (term <= NEGLIGIBLE * sum[0]) break;
@@ -72,15 +72,15 @@ static void profile(const epsmesh_query *tool, int is_paraboloid, double s, doub
         }
         out[0] = big * sum[0], out[1] = big / s * sum[1], out[2] = big * s * sum[2], out[3] = big * cube(s) * sum[3];
     } else {
-        double steep = 0.5 * PI / tan(tool->angle);
+        real steep = 0.5 * PI / tan(tool->angle);
         out[0] = steep * s, out[1] = steep, out[2] = steep * s * s / 2, out[3] = steep * s * s * s * s / 4;
     }
 }
 
 /* Add the depth by which a half-space at large displacements differs from Hertz's. */
-static void add_near(const epsmesh_query *tool, const place *p, pressed *k) {
-    double big = tool->radius, x = cbrt(k->force / (p->plane * big * big)), terms[3][EPSMESH_MOST];
-    double ratio[2] = {0, 0}, growth = 0, hertz = pow(0.75, 2.0 / 3) * x * x * big;
+static void add_near(const request *tool, const place *p, pressed *k) {
+    real big = tool->radius, x = cbrt(k->force / (p->plane * big * big)), terms[3][EPSMESH_MOST];
+    real ratio[2] = {0, 0}, growth = 0, hertz = pow(0.75, 2.0 / 3) * x * x * big;
     int i, j;
     polynomials(2 * x / p->near_most - 1, p->nears, terms);
     for (i = 0; i < p->nears; i++) {
@@ -93,8 +93,8 @@ static void add_near(const epsmesh_query *tool, const place *p, pressed *k) {
                      p->near_support * (hertz * ratio[0] + k->force * k->near_compliance);
 }
 
-static pressed press_to(double a, const epsmesh_query *tool, const place *p) {
-    double stiff = p->plane, h = p->h, d[4], own = 1 - 2.0 / 3 * stiff * h * cube(a), power, effect;
+static pressed press_to(real a, const request *tool, const place *p) {
+    real stiff = p->plane, h = p->h, d[4], own = 1 - 2.0 / 3 * stiff * h * cube(a), power, effect;
     pressed k = {-1, 0, 0, 0, 0, 0, 0, 1};
     if (!(own > 0)) return k;
     profile(tool, p->nears > 0, a, d);
@@ -116,16 +116,16 @@ static pressed press_to(double a, const epsmesh_query *tool, const place *p) {
 }
 
 /* The largest radius of contact that formulas and tables know. */
-static double limit_of(const epsmesh_query *tool, const place *p) {
-    double big = tool->radius, stiff;
+static real limit_of(const request *tool, const place *p) {
+    real big = tool->radius, stiff;
     if (!p->nears) return tool->shape == EPSMESH_SPHERE ? BALL_LIMIT * tool->radius : tool->radius;
     stiff = 4 / (3 * big) + 2.0 / 3 * p->h * p->plane * big * big * cube(p->near_most);
     return stiff > 0 ? cbrt(big * big * cube(p->near_most) / stiff) : HUGE_VAL; /* no contact reaches that force */
 }
 
-static int press_round(const epsmesh_query *tool, const place *p, double most, contact *k) {
-    double limit = limit_of(tool, p), depth = tool->depth;
-    double low = 0, high = most < limit ? most : limit, a, step, of_h, of_tilt;
+static int press_round(const request *tool, const place *p, real most, contact *k) {
+    real limit = limit_of(tool, p), depth = tool->depth;
+    real low = 0, high = most < limit ? most : limit, a, step, of_h, of_tilt;
     pressed found;
     int i;
     if (!(press_to(high, tool, p).depth >= depth)) return 0;
@@ -166,10 +166,10 @@ static const double RECTANGLE[5][8] = {
     {1.7362244, 0.2238417, 0.0903649, 0.0247386, 0.0048149, 0.0006582, 5.88e-05, 3.6e-06},
 };
 
-static int press_blade(const epsmesh_query *q, const double edge[2], const place *p, double most, contact *k) {
-    double big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[5] = {0, 0, 0, 0, 0};
-    double small = 0.5 * (q->length > q->width ? q->width : q->length), e[2][2], lean[2], twice[2], mean, half, soft;
-    double of_place[2], along_edge, across;
+static int press_blade(const request *q, const real edge[2], const place *p, real most, contact *k) {
+    real big = 0.5 * (q->length > q->width ? q->length : q->width), c8[3][EPSMESH_MOST], r[5] = {0, 0, 0, 0, 0};
+    real small = 0.5 * (q->length > q->width ? q->width : q->length), e[2][2], lean[2], twice[2], mean, half, soft;
+    real of_place[2], along_edge, across;
     int i, j;
     if (sqrt(big * big + small * small) > most) return 0;
     polynomials(1 - 2 * log(small / big) / log(SLENDER), 8, c8);
@@ -188,7 +188,7 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
         of_place[i] = p->slope_c[i] + mean * p->slope_h[i] +
                       half * (twice[0] * p->bent_slopes[0][i] + twice[1] * p->bent_slopes[1][i]);
     for (j = 0; j < 2; j++) {
-        double slope = p->lean[0] * e[j][0] + p->lean[1] * e[j][1];
+        real slope = p->lean[0] * e[j][0] + p->lean[1] * e[j][1];
         soft -= lean[j] * slope * slope / 4;
         for (i = 0; i < 2; i++)
             of_place[i] -= lean[j] / 2 * slope * (p->hessian[i][0] * e[j][0] + p->hessian[i][1] * e[j][1]);
@@ -200,10 +200,10 @@ static int press_blade(const epsmesh_query *q, const double edge[2], const place
 }
 
 /* The last column of the inverse of compliances, as force per depth. */
-static contact press_bonded(double a, double depth, const place *p) {
-    double shear = 0.5 / (1 + p->poisson), soft = 1 - 2 * p->poisson, xx, yy, zz, xy, xz, yz, det;
-    double down = 4 * shear * a * (soft > SOFT ? log(1 + 2 * soft) / soft : 2);
-    double aside = 8 * shear * a / (2 - p->poisson);
+static contact press_bonded(real a, real depth, const place *p) {
+    real shear = 0.5 / (1 + p->poisson), soft = 1 - 2 * p->poisson, xx, yy, zz, xy, xz, yz, det;
+    real down = 4 * shear * a * (soft > SOFT ? log(1 + 2 * soft) / soft : 2 - 2 * soft);
+    real aside = 8 * shear * a / (2 - p->poisson);
     contact k;
     xx = p->regular[0][0] + 1 / aside, yy = p->regular[1][1] + 1 / aside, xy = p->regular[0][1];
     xz = p->regular[0][2], yz = p->regular[1][2], zz = p->regular[2][2] + 1 / down + a * a / 3 * p->h;

@@ -49,7 +49,7 @@ static void outline_to(const epsmesh_patch *t, double depth, double out[2]) {
     int i, k, halved;
     out[0] = out[1] = SMALLEST * t->reach;
     for (i = 0; i < ROUND; i++) {
-        ray[0][i] = cos(2 * PI * i / ROUND), ray[1][i] = sin(2 * PI * i / ROUND);
+        ray[0][i] = cos(2 * PI * i / (double)ROUND), ray[1][i] = sin(2 * PI * i / (double)ROUND);
         low[i] = 0, high[i] = t->reach;
     }
     for (halved = 0; halved < HALVINGS; halved++) {
@@ -153,10 +153,10 @@ typedef struct {
 static void lay(const epsmesh_patch *t, const place *p, double depth, double turn, const double size[2], cells *c) {
     double along = cos(turn), aside = sin(turn), at[2][ALL], z[ALL];
     int i, k, inside = 0;
-    for (k = 0; k < 2; k++) c->step[k] = 2 * size[k] / N;
+    for (k = 0; k < 2; k++) c->step[k] = 2 * size[k] / (double)N;
     c->area = c->step[0] * c->step[1];
     for (i = 0; i < ALL; i++) {
-        double x = size[0] * (2 * (i / N + 0.5) / N - 1), y = size[1] * (2 * (i % N + 0.5) / N - 1), u, v;
+        double x = size[0] * (2 * (i / N + 0.5) / (double)N - 1), y = size[1] * (2 * (i % N + 0.5) / (double)N - 1), u, v;
         c->own[0][i] = x, c->own[1][i] = y;
         u = c->at[0][i] = along * x - aside * y, v = c->at[1][i] = aside * x + along * y;
         c->gap[i] = -HUGE_VAL;
@@ -257,7 +257,7 @@ static int within(epsmesh_patch *t, const place *p, double depth, double turn, s
     outline_at(t, depth, size);
     for (k = 0; k < 2; k++) size[k] *= ((1 - share) * t->fills[i][k] + share * t->fills[i + 1][k]) / FILLED;
     for (grown = 0; grown < GROWTHS; grown++) {
-        double free_row = 1 - 1.5 / N;
+        double free_row = 1 - 1.5 / (double)N;
         if (!settle(t, p, depth, turn, size, s)) return 0;
         if (s->extent[0] * s->extent[0] + s->extent[1] * s->extent[1] > t->reach * t->reach) return 0;
         if (s->extent[0] < size[0] * free_row && s->extent[1] < size[1] * free_row) return 1;
@@ -277,7 +277,7 @@ static epsmesh_status patch_make(epsmesh_patch *t, double reach) {
     heights_of(t, 1, &x, &y, &z);
     if (z != 0) return EPSMESH_INPUT;
     for (i = 0; i < ROUND; i++) {
-        x = reach * cos(2 * PI * i / ROUND), y = reach * sin(2 * PI * i / ROUND);
+        x = reach * cos(2 * PI * i / (double)ROUND), y = reach * sin(2 * PI * i / (double)ROUND);
         heights_of(t, 1, &x, &y, &z);
         if (!isfinite(z)) return EPSMESH_INPUT;
         rim = smaller(rim, z), top = z > top ? z : top;
@@ -296,7 +296,7 @@ static epsmesh_status patch_make(epsmesh_patch *t, double reach) {
             for (k = 0; k < 2; k++) size[k] = t->fills[i][k] * outline[k] / FILLED;
             if (!settle(t, &none, depth, 0, size, &s)) continue;
             for (k = 0; k < 2; k++) {
-                double fill = (s.extent[k] + size[k] / N) / outline[k];
+                double fill = (s.extent[k] + size[k] / (double)N) / outline[k];
                 t->fills[i][k] = fill < 0.2 ? 0.2 : fill > 1 ? 1 : fill;
             }
         }

@@ -1,76 +1,12 @@
-/* Queries of one tool: what is refused, the place below a tip, force and error bar in the body's coordinates. */
-/* ---- queries ---- */
+/* Queries of one tool: the place below a tip, force and error bar. */
 
-static double smaller(double a, double b) { return a < b ? a : b; }
-
-static double room_at(const epsmesh_model *m, double x, double y) {
-    if (m->is_round) return smaller(m->sides[0] - sqrt(x * x + y * y), m->thickness);
-    return smaller(smaller(m->sides[0] - fabs(x), m->sides[1] - fabs(y)), m->thickness);
-}
-
-static int is_inside(const epsmesh_model *m, double x, double y) {
-    if (m->is_round) return x * x + y * y <= m->reach[0] * m->reach[0];
-    return fabs(x) <= m->reach[0] && fabs(y) <= m->reach[1];
-}
-
-static int is_positive(double x) { return isfinite(x) && x > 0; }
-
-static void into_face(const epsmesh_model *m, const double at[3], double local[3]) {
-    int i, j;
-    for (i = 0; i < 3; i++)
-        for (local[i] = 0, j = 0; j < 3; j++) local[i] += m->axes[i][j] * (at[j] - m->origin[j]);
-}
-
-/* Return whether the model has this tool; `edge` is the direction of a blade on the face. */
-static epsmesh_status tool_of(const epsmesh_model *m, const epsmesh_query *q, double edge[2]) {
-    int i, j, is_blade = q->shape == EPSMESH_BLADE, has_angle = q->shape == EPSMESH_CONE;
-    edge[0] = 1, edge[1] = 0;
-    if ((int)q->shape < EPSMESH_DISC || (int)q->shape > EPSMESH_BONDED_DISC) return EPSMESH_TOOL;
-    if ((is_blade || q->shape == EPSMESH_BONDED_DISC) && !m->has_tensors) return EPSMESH_TOOL;
-    if (m->is_large && q->shape != EPSMESH_SPHERE) return EPSMESH_TOOL;
-    if (!is_blade) {
-        if (!isfinite(q->radius) || (has_angle && !isfinite(q->angle))) return EPSMESH_TOOL;
-        if (q->radius < SMALLEST || (has_angle && !(0.01 <= q->angle && q->angle <= PI / 2 - 0.001)))
-            return EPSMESH_INPUT;
-        return EPSMESH_OK;
-    }
-    if (!isfinite(q->length) || !isfinite(q->width)) return EPSMESH_TOOL;
-    if (q->length < SMALLEST || q->width < SMALLEST) return EPSMESH_INPUT;
-    if (!isfinite(q->along[0]) || !isfinite(q->along[1]) || !isfinite(q->along[2])) return EPSMESH_INPUT;
-    if (q->along[0] != 0 || q->along[1] != 0 || q->along[2] != 0) {
-        double size;
-        for (i = 0; i < 2; i++)
-            for (edge[i] = 0, j = 0; j < 3; j++) edge[i] += m->axes[i][j] * q->along[j];
-        size = sqrt(edge[0] * edge[0] + edge[1] * edge[1]);
-        if (!is_positive(size)) return EPSMESH_INPUT;
-        edge[0] /= size, edge[1] /= size;
-    }
-    return q->width < SLENDER * q->length || q->length < SLENDER * q->width ? EPSMESH_TOOL : EPSMESH_OK;
-}
-
-static epsmesh_status misfit(const epsmesh_model *m, const epsmesh_query *q, double local[3], double edge[2], spot *f) {
-    double length = 0, inward = 0;
-    epsmesh_status status;
-    int i, j;
-    if (!m->is_loaded) return EPSMESH_NO_MODEL;
-    status = tool_of(m, q, edge);
-    if (status != EPSMESH_OK) return status;
-    if (!isfinite(q->depth) || !isfinite(q->poisson) || !is_positive(q->young)) return EPSMESH_INPUT;
-    into_face(m, q->at, local);
-    if (!(isfinite(local[0]) && isfinite(local[1]) && isfinite(local[2]))) return EPSMESH_INPUT;
-    if (!is_inside(m, local[0], local[1])) return EPSMESH_OUTSIDE;
-    *f = face_at(m, local[0], local[1]);
-    for (i = 0; i < 3; i++) {
-        if (!isfinite(q->axis[i])) return EPSMESH_INPUT;
-        length += q->axis[i] * q->axis[i];
-        for (j = 0; j < 3; j++) inward -= f->normal[i] * m->axes[i][j] * q->axis[j];
-    }
-    if (!isfinite(length)) return EPSMESH_INPUT;
-    if (length > 0 && !(inward / sqrt(length) >= 1 - 0.5 * m->aligned * m->aligned)) return EPSMESH_TILTED;
-    if (!(fabs(local[2] - f->height) <= m->off)) return EPSMESH_OFF;
-    if (!(m->poisson_range[0] <= q->poisson && q->poisson <= m->poisson_range[1])) return EPSMESH_POISSON;
-    if (q->depth >= m->thickness) return EPSMESH_DEEP;
-    return q->depth <= TOUCHING ? EPSMESH_NO_CONTACT : EPSMESH_OK;
+/* Rows: two unit tangents, the first one above x, and the outward normal. */
+static void turn_of(const spot *f, double turn[3][3]) {
+    const double *n = f->normal, size = sqrt(n[2] * n[2] + n[0] * n[0]);
+    int i;
+    turn[0][0] = n[2] / size, turn[0][1] = 0, turn[0][2] = -n[0] / size;
+    for (i = 0; i < 3; i++) turn[2][i] = n[i];
+    for (i = 0; i < 3; i++) turn[1][i] = n[(i + 1) % 3] * turn[0][(i + 2) % 3] - n[(i + 2) % 3] * turn[0][(i + 1) % 3];
 }
 
 /* Move a place to about the nearest one of the region; return whether it was outside. */
@@ -146,29 +82,6 @@ epsmesh_query epsmesh_ask(const epsmesh_model *m) {
     return q;
 }
 
-/* A valid query, with the values at its place. */
-typedef struct {
-    double local[3], edge[2], room;
-    spot f;
-    place p;
-} asked;
-
-static int surveyed(const epsmesh_model *m, const epsmesh_query *q, asked *a) {
-    if (!place_at(m, a->local[0], a->local[1], q->poisson, q->shape >= EPSMESH_BLADE, &a->p)) return 0;
-    a->p.bend = a->f.bend, a->p.slope_bend[0] = a->f.slope_bend[0], a->p.slope_bend[1] = a->f.slope_bend[1];
-    a->room = room_at(m, a->local[0], a->local[1]);
-    return 1;
-}
-
-/* Return whether the contact of a tool at a depth of its query is small enough. */
-static int press(const epsmesh_model *m, const epsmesh_query *q, const asked *a, contact *k) {
-    double most = m->largest * a->room;
-    if (q->shape == EPSMESH_BLADE) return press_blade(q, a->edge, &a->p, most, k);
-    if (q->shape == EPSMESH_SPHERE || q->shape == EPSMESH_CONE) return press_round(q, &a->p, most, k);
-    *k = q->shape == EPSMESH_DISC ? press_disc(q->radius, q->depth, &a->p) : press_bonded(q->radius, q->depth, &a->p);
-    return q->radius <= most;
-}
-
 /* The error bar of a force, as a share of it. */
 static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked *a, const contact *k) {
     double share = (k->radius / a->room) * (k->radius / a->room), error;
@@ -192,14 +105,9 @@ static double bar_of(const epsmesh_model *m, const epsmesh_query *q, const asked
 static epsmesh_touch answer_of(const epsmesh_model *m, double young, double depth, const asked *a, const contact *k,
                           double error) {
     epsmesh_touch t;
-    double force[3];
-    int i, j;
     t.status = EPSMESH_OK, t.stiffness = young * k->stiffness, t.contact_radius = k->radius;
     t.force_error = error * young * k->force;
-    if (k->sticks) reaction_at(&a->f, k->force, k->aside, force);
-    else force_at(&a->f, k->force, k->aside, depth, force);
-    for (i = 0; i < 3; i++)
-        for (t.force[i] = 0, j = 0; j < 3; j++) t.force[i] += young * force[j] * m->axes[j][i];
+    force_of(m, young, depth, a, k, t.force);
     if (!(k->force > 0 && is_positive(t.stiffness) && t.force_error >= 0 && isfinite(t.force_error) &&
           isfinite(t.force[0]) && isfinite(t.force[1]) && isfinite(t.force[2])))
         return all(EPSMESH_DAMAGED, (double)NAN);

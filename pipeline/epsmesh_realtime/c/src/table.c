@@ -1,21 +1,21 @@
 /* Values of the tables at a place, with derivatives (epsmesh_realtime/table.py defines the tables); the face there. */
 
 typedef struct {
-    double c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
-    double bent[2], bent_slopes[2][2], lean[2], hessian[2][2], regular[3][3]; /* of blades and bonded tools */
-    double near[2][EPSMESH_MOST_NEAR], near_most, near_support; /* over x, for nu; 0 terms at small strain */
+    real c, h, tilt, slope_c[2], slope_h[2], slope_tilt[2], plane, poisson, bend, slope_bend[2];
+    real bent[2], bent_slopes[2][2], lean[2], hessian[2][2], regular[3][3]; /* of blades and bonded tools */
+    real near[2][EPSMESH_MOST_NEAR], near_most, near_support; /* over x, for nu; 0 terms at small strain */
     int nears;
 } place;
 
 typedef struct {
-    double f, slope[2], xx, xy, yy;
+    real f, slope[2], xx, xy, yy;
 } value;
 
 typedef struct {
-    double nu[3][EPSMESH_MOST], left[3][EPSMESH_MOST], right[3][EPSMESH_MOST];
+    real nu[3][EPSMESH_MOST], left[3][EPSMESH_MOST], right[3][EPSMESH_MOST];
 } terms;
 
-static void polynomials(double at, int n, double p[3][EPSMESH_MOST]) {
+static void polynomials(real at, int n, real p[3][EPSMESH_MOST]) {
     int i;
     p[0][0] = 1, p[1][0] = p[2][0] = 0;
     if (n > 1) p[0][1] = at, p[1][1] = 1, p[2][1] = 0;
@@ -26,8 +26,8 @@ static void polynomials(double at, int n, double p[3][EPSMESH_MOST]) {
     }
 }
 
-static void directions(const epsmesh_model *m, double x, double y, int rows, int columns, terms *p) {
-    double a = m->reach[0], b = m->reach[1], u, v;
+static void directions(const epsmesh_model *m, real x, real y, int rows, int columns, terms *p) {
+    real a = m->reach[0], b = m->reach[1], u, v;
     if (m->is_axial) {
         u = 2 * (x * x + y * y) / (a * a) - 1, v = 0;
     } else {
@@ -38,14 +38,14 @@ static void directions(const epsmesh_model *m, double x, double y, int rows, int
     polynomials(u, columns, p->right);
 }
 
-static value along(const epsmesh_model *m, const double *table, const terms *p, const int counts[3], double x, double y) {
+static value along(const epsmesh_model *m, const double *table, const terms *p, const int counts[3], real x, real y) {
     int i, j, k, rows = counts[1], columns = counts[2];
-    double f = 0, fu = 0, fv = 0, fuu = 0, fuv = 0, fvv = 0, a = m->reach[0], b = m->reach[1], bend = 4 / (a * a);
+    real f = 0, fu = 0, fv = 0, fuu = 0, fuv = 0, fvv = 0, a = m->reach[0], b = m->reach[1], bend = 4 / (a * a);
     value found;
     for (j = 0; j < rows; j++) {
-        double sum[3] = {0, 0, 0};
+        real sum[3] = {0, 0, 0};
         for (k = 0; k < columns; k++) {
-            double flat = 0;
+            real flat = 0;
             for (i = 0; i < counts[0]; i++) flat += p->nu[0][i] * table[(i * rows + j) * columns + k];
             sum[0] += flat * p->right[0][k], sum[1] += flat * p->right[1][k], sum[2] += flat * p->right[2][k];
         }
@@ -54,12 +54,12 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
     }
     found.f = f;
     if (m->is_axial) {
-        double ux = bend * x, uy = bend * y;
+        real ux = bend * x, uy = bend * y;
         found.slope[0] = fu * ux, found.slope[1] = fu * uy;
         found.xx = fuu * ux * ux + fu * bend, found.xy = fuu * ux * uy, found.yy = fuu * uy * uy + fu * bend;
     } else {
-        double ux = m->even[0] ? bend * x : 1 / a, uxx = m->even[0] ? bend : 0;
-        double vy = m->even[1] ? 4 / (b * b) * y : 1 / b, vyy = m->even[1] ? 4 / (b * b) : 0;
+        real ux = m->even[0] ? bend * x : 1 / a, uxx = m->even[0] ? bend : 0;
+        real vy = m->even[1] ? 4 / (b * b) * y : 1 / b, vyy = m->even[1] ? 4 / (b * b) : 0;
         found.slope[0] = fu * ux, found.slope[1] = fv * vy;
         found.xx = fuu * ux * ux + fu * uxx, found.xy = fuv * ux * vy, found.yy = fvv * vy * vy + fv * vyy;
     }
@@ -67,9 +67,9 @@ static value along(const epsmesh_model *m, const double *table, const terms *p, 
 }
 
 /* The factor of one of the seven tables, with its gradient (1/m): what symmetry implies, epsmesh_realtime/table.py. */
-static double factor(const epsmesh_model *m, int k, double x, double y, double own[2]) {
-    double xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
-    double of_x = m->even[0] ? 1 / m->reach[0] : 0, of_y = m->even[1] ? 1 / m->reach[1] : 0;
+static real factor(const epsmesh_model *m, int k, real x, real y, real own[2]) {
+    real xi = m->even[0] ? x / m->reach[0] : 1, eta = m->even[1] ? y / m->reach[1] : 1;
+    real of_x = m->even[0] ? 1 / m->reach[0] : 0, of_y = m->even[1] ? 1 / m->reach[1] : 0;
     own[0] = own[1] = 0;
     if ((k == 0 || k == 5) && m->is_axial) {
         own[0] = 2 * xi * of_x, own[1] = -2 * eta * of_y;
@@ -85,9 +85,9 @@ static double factor(const epsmesh_model *m, int k, double x, double y, double o
 }
 
 /* Values for blades and bonded tools. */
-static void shape_at(const epsmesh_model *m, const terms *s, double x, double y, double t, const double slope_t[2],
+static void shape_at(const epsmesh_model *m, const terms *s, real x, real y, real t, const real slope_t[2],
                      place *p) {
-    double f[EPSMESH_TENSORS], g, own[2];
+    real f[EPSMESH_TENSORS], g, own[2];
     size_t whole = (size_t)m->counts[0] * (size_t)m->counts[1] * (size_t)m->counts[2];
     int i, k;
     for (k = 0; k < EPSMESH_TENSORS; k++) {
@@ -104,22 +104,23 @@ static void shape_at(const epsmesh_model *m, const terms *s, double x, double y,
 }
 
 /* The ratios of a ball on a half-space at large displacements to H. Hertz's, for this nu: src/contact.c. */
-static void near_of(const epsmesh_model *m, double ratio, place *p) {
-    double nu[3][EPSMESH_MOST], low = m->poisson_range[0], high = m->poisson_range[1];
+static void near_of(const epsmesh_model *m, real ratio, place *p) {
+    real nu[3][EPSMESH_MOST], low = m->poisson_range[0], high = m->poisson_range[1];
     const double *c = m->near;
     int i, j, k;
     p->nears = m->is_large ? m->near_counts[1] : 0, p->near_most = m->near_most;
     p->near_support = m->near_support / (m->thickness * m->thickness);
     if (!p->nears) return;
-    memset(p->near, 0, sizeof p->near);
     polynomials(high == low ? 0 : (2 * ratio - low - high) / (high - low), m->near_counts[0], nu);
-    for (k = 0; k < 2; k++)
+    for (k = 0; k < 2; k++) {
+        for (i = 0; i < p->nears; i++) p->near[k][i] = 0;
         for (j = 0; j < m->near_counts[0]; j++)
             for (i = 0; i < p->nears; i++) p->near[k][i] += nu[0][j] * *c++;
+    }
 }
 
-static int place_at(const epsmesh_model *m, double x, double y, double ratio, int whole, place *p) {
-    double t, q, low = m->poisson_range[0], high = m->poisson_range[1];
+static int place_at(const epsmesh_model *m, real x, real y, real ratio, int whole, place *p) {
+    real t, q, low = m->poisson_range[0], high = m->poisson_range[1];
     value of_t, of_q;
     terms s;
     int i, j;
@@ -133,7 +134,7 @@ static int place_at(const epsmesh_model *m, double x, double y, double ratio, in
         p->slope_c[i] = -of_t.slope[i] / (t * t);
         p->slope_h[i] = of_q.slope[i] / (t * t * t) - 3 * q * of_t.slope[i] / (t * t * t * t);
         for (j = 0; j < 2; j++) {
-            double second = i == j ? (i ? of_t.yy : of_t.xx) : of_t.xy;
+            real second = i == j ? (i ? of_t.yy : of_t.xx) : of_t.xy;
             p->hessian[i][j] = m->leans ? 2 * of_t.slope[i] * of_t.slope[j] / (t * t * t) - second / (t * t) : 0;
         }
     }
@@ -151,12 +152,10 @@ static int place_at(const epsmesh_model *m, double x, double y, double ratio, in
 
 /* ---- the face ---- */
 
-typedef epsmesh_spot spot;
-
-static spot face_at(const epsmesh_model *m, double x, double y) {
+static spot face_at(const epsmesh_model *m, real x, real y) {
     spot f = {0, {0, 0}, {{0, 0}, {0, 0}}, 0, {0, 0}, {0, 0, 1}};
     int counts[3], i;
-    double steep;
+    real steep;
     terms s;
     value z, bend;
     if (m->is_flat) return f;
@@ -176,18 +175,9 @@ static spot face_at(const epsmesh_model *m, double x, double y) {
     return f;
 }
 
-/* Rows: two unit tangents, the first one above x, and the outward normal. */
-static void turn_of(const spot *f, double turn[3][3]) {
-    const double *n = f->normal, size = sqrt(n[2] * n[2] + n[0] * n[0]);
-    int i;
-    turn[0][0] = n[2] / size, turn[0][1] = 0, turn[0][2] = -n[0] / size;
-    for (i = 0; i < 3; i++) turn[2][i] = n[i];
-    for (i = 0; i < 3; i++) turn[1][i] = n[(i + 1) % 3] * turn[0][(i + 2) % 3] - n[(i + 2) % 3] * turn[0][(i + 1) % 3];
-}
-
 /* The force on a tool whose tip is at p - d n: its work is the decrease of the energy. */
-static void force_at(const spot *f, double push, const double aside[2], double depth, double out[3]) {
-    double steep = sqrt(1 + f->slope[0] * f->slope[0] + f->slope[1] * f->slope[1]), m[2][2], det, x, y;
+static void force_at(const spot *f, real push, const real aside[2], real depth, real out[3]) {
+    real steep = sqrt(1 + f->slope[0] * f->slope[0] + f->slope[1] * f->slope[1]), m[2][2], det, x, y;
     int i, j;
     for (i = 0; i < 2; i++)
         for (j = 0; j < 2; j++) m[i][j] = (i == j) + f->slope[i] * f->slope[j] + depth / steep * f->second[i][j];
@@ -198,8 +188,8 @@ static void force_at(const spot *f, double push, const double aside[2], double d
 }
 
 /* The force on a tool that sticks, from components along the normal and along axes turned by the least angle to it. */
-static void reaction_at(const spot *f, double push, const double aside[2], double out[3]) {
-    const double *n = f->normal, share = (aside[0] * n[0] + aside[1] * n[1]) / (1 + n[2]);
+static void reaction_at(const spot *f, real push, const real aside[2], real out[3]) {
+    const real *n = f->normal, share = (aside[0] * n[0] + aside[1] * n[1]) / (1 + n[2]);
     out[0] = push * n[0] + aside[0] - share * n[0], out[1] = push * n[1] + aside[1] - share * n[1];
     out[2] = push * n[2] - share * (1 + n[2]);
 }
