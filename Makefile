@@ -123,9 +123,10 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.drag --minutes 5
 	$(EPSMESH) run studies/speedup.toml --fresh
 
-peers: setup ## compare the time for a true error with NGSolve, scikit-fem and CalculiX (on an idle machine): results/peers.md
+peers: setup ## compare with NGSolve, scikit-fem and CalculiX the time for a true error, with NGSolve error bars (on an idle machine)
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.peers $(PEERS_ARGS)
+	$(PYTHON) -m benchmarks.strangers
 
 plain-loop: setup ## compare a plain FEniCSx script of a study with this program (on an idle machine, an hour or two)
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)

@@ -335,14 +335,16 @@ def campaign(
     drawn: Drawn,
     told: Callable[[list[Row]], str],
     judge: Callable[[int, Path, Drawn], Row] = judged,
+    count: int = 1000,
 ) -> list[Row]:
     """Run the scenes that the options in ``arguments`` name, write and print what is ``told`` of them, return the rows.
 
-    The log is NAME-KIND.jsonl, where KIND says what the seeds are for; a later call goes on there.
+    Without the option they are ``count`` of the test. The log is NAME-KIND.jsonl, where KIND says what the seeds are
+    for; a later call goes on there.
     """
     parser = options(about)
     first, _ = SEEDS["test"]
-    parser.add_argument("--seeds", default=f"{first}:{first + 1000}", help="FIRST:END")
+    parser.add_argument("--seeds", default=f"{first}:{first + count}", help="FIRST:END")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time; a later call goes on")
     asked = parser.parse_args(arguments)
     first, end = map(int, asked.seeds.split(":"))
