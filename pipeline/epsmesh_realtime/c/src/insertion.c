@@ -27,10 +27,10 @@ static knots knots_at(const double *rows, int count, int columns, double depth) 
     knots k;
     while (high - low > 1) {
         int middle = (low + high) / 2;
-        if (rows[(size_t)middle * columns] <= depth) low = middle;
+        if (rows[(size_t)middle * (size_t)columns] <= depth) low = middle;
         else high = middle;
     }
-    k.low = rows + (size_t)low * columns, k.high = k.low + columns;
+    k.low = rows + (size_t)low * (size_t)columns, k.high = k.low + columns;
     k.width = k.high[0] - k.low[0];
     k.share = k.width > 0 ? (depth - k.low[0]) / k.width : 1;
     if (!(k.share > 0)) k.share = 0;
