@@ -10,6 +10,7 @@ STAGE ?= epsmesh
 GOALS ?= setup
 PEERS_ARGS ?=
 FUZZ ?= 5000
+FUZZ_MODELS ?= 100000
 LOOP_ARGS ?=
 SOAK_ARGS ?=
 SAME_ARGS ?= --seeds 0:300
@@ -155,8 +156,9 @@ coverage: setup ## how often error bars cover the error, on 1,000 random scenes 
 refit: setup ## what random scenes say of each constant of error bars (an hour in parts of 9 minutes; REFIT_ARGS="--seeds 0:120")
 	$(MPI_ENV) nice $(PYTHON) -m benchmarks.refit $(REFIT_ARGS)
 
-fuzz: setup ## random study files, damaged surfaces, datasets, stores and models (minutes)
+fuzz: setup ## random study files, damaged surfaces, datasets, stores and models; models in C with sanitizers (an hour)
 	EPSMESH_FUZZ=$(FUZZ) $(MPI_ENV) $(PYTHON) -m pytest tests/fuzz -q $(PYTEST_ARGS)
+	EPSMESH_FUZZ_MODELS=$(FUZZ_MODELS) $(PYTHON) -m pytest tests/realtime/test_c.py -k damaged -m "" -q -s $(PYTEST_ARGS)
 
 pairs: setup ## run every feature of a study alone and with every other, into results/pairs.md
 	$(MPI_ENV) nice $(PYTHON) -m tests.pairs

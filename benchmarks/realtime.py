@@ -34,10 +34,10 @@ from epsmesh_realtime.export.scope import Scope, scope_of
 from epsmesh_realtime.export.tabulate import shares
 from epsmesh_realtime.model import Model
 
-_FOLDER = Path("results/realtime")
+FOLDER = Path("results/realtime")
 # Accuracy of models; accuracies of the full solves for flat tools, for those on organs, and for others; number of
 # touches for the calibration of a model's bars, and again for its test.
-ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, _CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
+ACCURACY, _PRECISE, _PRECISE_ORGAN, _PRECISE_ROUND, CHECKS = 0.01, 0.0025, 0.005, 0.006, 12
 _COLUMNS = (
     "model", "tool", "touches", "places", "median error", "largest", "held", "with truth's bar", "bar/error",
     "truth's bar", "half-space", "nearest point",
@@ -125,11 +125,11 @@ def main() -> None:
         for name in list(rounds):
             if next(rounds[name], None) is None:
                 del rounds[name]
-    rows = [row for name in names for row in _rows(name, read(_FOLDER / f"{name}.epsm"))]
+    rows = [row for name in names for row in _rows(name, read(FOLDER / f"{name}.epsm"))]
     print(markdown(rows, dict.fromkeys(_COLUMNS, "")))
     if asked.seconds > 0:
         print()
-        print(_latency(_FOLDER / f"{names[0]}.epsm", asked.seconds))
+        print(_latency(FOLDER / f"{names[0]}.epsm", asked.seconds))
 
 
 def _of_insertion(path: Path) -> str:
@@ -146,7 +146,7 @@ def _of_insertion(path: Path) -> str:
 
 
 def _records(name: str, tools: str = "touches") -> Path:
-    return _FOLDER / f"{name}.{tools}.jsonl"
+    return FOLDER / f"{name}.{tools}.jsonl"
 
 
 def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
@@ -159,7 +159,7 @@ def _touches(name: str, flat: int, others: int) -> Iterator[list[Check]]:
 
 def _model(name: str) -> tuple[Model, Solver]:
     """Return a model, and the solver of its touches."""
-    model, scope = model_of(name, _FOLDER, _CHECKS)
+    model, scope = model_of(name, FOLDER, CHECKS)
     precise = _PRECISE if scope.body.half_sides else _PRECISE_ORGAN
     return model, Solver(scope.sections, scope.file, scope.young, precise)
 
@@ -269,7 +269,7 @@ def _percent(value: float) -> str:
 
 def _latency(path: Path, seconds: float) -> str:
     """Return the time of queries in C and from Python, and the late ticks of a loop at 1 kHz."""
-    program = _FOLDER / "latency"
+    program = FOLDER / "latency"
     sources = ["pipeline/epsmesh_realtime/c/epsmesh.c", "pipeline/epsmesh_realtime/c/latency.c"]
     subprocess.run(["cc", "-std=c99", "-O2", *sources, "-o", str(program), "-lm"], check=True)
     arguments = [str(program), str(path), "20000", f"{seconds:g}"]

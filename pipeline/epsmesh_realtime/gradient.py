@@ -54,9 +54,7 @@ def gradient(
     Raises:
         ValueError: if the force is no function of a number, or shapes do not go together.
     """
-    for name in by:
-        if reason := why_not(query, name, is_fixed=is_fixed):
-            raise ValueError(f"no derivative of the force on a {query.tool!r} with {name!r}: {reason}")
+    check(query, by, is_fixed=is_fixed)
     queries, found = many(packed_each(query, young, poisson))
     numbers = np.array([place for name in by for place in _PLACES[name]], dtype=np.int32)
     slopes, sides = np.zeros((len(queries), 3, len(numbers))), np.zeros(len(queries), dtype=np.int32)
@@ -69,8 +67,18 @@ def gradient(
     return Gradient(touches_of(found), of, SIDES[sides])
 
 
-def why_not(query: Query, name: str, *, is_fixed: bool) -> str:
-    """Return why the force is no function of a number, "" if it is one."""
+def check(query: Query, by: Sequence[str], *, is_fixed: bool) -> None:
+    """Refuse a number that the force is no function of; ``is_fixed``: the model has a single Poisson's ratio.
+
+    Raises:
+        ValueError: with the reason.
+    """
+    for name in by:
+        if reason := _why_not(query, name, is_fixed=is_fixed):
+            raise ValueError(f"no derivative of the force on a {query.tool!r} with {name!r}: {reason}")
+
+
+def _why_not(query: Query, name: str, *, is_fixed: bool) -> str:
     own = _SIZES.get(query.tool, ())
     if name == "axis":
         return "a tool presses along the face's inward normal; the axis is only compared with it"
@@ -96,3 +104,42 @@ def _work(
     arrays = [array.ctypes.data for array in (queries[part], found[part])]
     results = [array.ctypes.data for array in (numbers, slopes[part], sides[part])]
     gradients()(evaluator.pointer, len(queries[part]), *arrays, len(numbers), *results)
+
+
+VECTORS = ("at", "axis", "along")
+
+
+def forces(
+    model: Any, tool: str, by: Sequence[str], numbers: Mapping[str, Any], contact: str | None
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Return forces (..., 3) and their derivatives with the numbers named in ``by``, for programs that differentiate.
+
+    ``numbers`` have the shape (...), a place or direction (..., 3); they are broadcast. Derivatives are as in
+    :class:`Gradient`, of the shape (..., 3) or (..., 3, 3).
+
+    Raises:
+        ValueError: as ``Model.gradient``.
+    """
+    shape = shape_of(numbers)
+    flat = {
+        name: np.broadcast_to(number, (*shape, 3)).reshape(-1, 3)
+        if name in VECTORS
+        else np.broadcast_to(number, shape).ravel()
+        for name, number in numbers.items()
+    }
+    found = model.gradient(tool, by=by, contact=contact, **flat)
+    slopes = [found.of[name].reshape(*shape, *found.of[name].shape[1:]) for name in by]
+    return found.touches.force.reshape(*shape, 3), slopes
+
+
+def shape_of(numbers: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return the shape (...) of the numbers of queries by name, places and directions (..., 3).
+
+    Raises:
+        ValueError: if they do not go together.
+    """
+    shapes = {name: tuple(np.shape(number)) for name, number in numbers.items()}
+    for name, shape in shapes.items():
+        if name in VECTORS and shape[-1:] != (3,):
+            raise ValueError(f"{name!r} has the shape (..., 3), not {shape}")
+    return np.broadcast_shapes(*(shape[:-1] if name in VECTORS else shape for name, shape in shapes.items()))

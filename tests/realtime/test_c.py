@@ -51,9 +51,10 @@ int main(int count, char **words) {
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
 
-def compiled(*arguments: object) -> None:
+def compiled(*arguments: object) -> str:
     found = subprocess.run([*map(str, arguments)], capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stderr
+    return found.stdout
 
 
 def test_parts_are_short_and_names_are_those_of_the_headers(tmp_path):
@@ -107,26 +108,37 @@ def test_the_foot_of_a_tip_is_its_place_and_its_depth(kind):
     assert model.foot((0.0, 0.0))[0] == "input"
 
 
+NEAR = Near(np.array([[[1.1, 0.08]], [[0.9, -0.1]]]), 1.2, 2e-3, 0.1, 0.08)
+SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize(
-    ("program", "kind", "near"),
+    ("program", "kind", "parts"),
     [
-        ("test_epsmesh.c", {}, None),
-        ("test_epsmesh.c", {"curved": True, "is_even": False}, None),
-        ("test_epsmesh.c", {"is_round": True, "is_even": False}, None),
-        ("test_epsmesh.c", {}, Near(np.array([[[1.1, 0.08]], [[0.9, -0.1]]]), 1.2, 2e-3, 0.1, 0.08)),
-        ("tips.c", {}, None),
+        ("test_epsmesh.c", {}, {}),
+        ("test_epsmesh.c", {"curved": True, "is_even": False}, {}),
+        ("test_epsmesh.c", {"is_round": True, "is_even": False}, {"relaxation": ((0.4, 2.0), (0.2, 30.0))}),
+        ("test_epsmesh.c", {}, {"near": NEAR, "pairs": None}),
+        ("tips.c", {}, {}),
     ],
 )
-def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, near):
+def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, parts):
+    """$EPSMESH_FUZZ_MODELS, of `make fuzz`, is the number of damaged files of each model; otherwise it is 30,000."""
     made = random_surface(**kind)
-    model = replace(made.model, near=near, pairs=None) if near else made.model
-    write_model(tmp_path / "model.epsm", model, {}, {"title": "random"}, made.table)
+    write_model(tmp_path / "model.epsm", replace(made.model, **parts), {}, {"title": "random"}, made.table)
     (tmp_path / "tips.c").write_text(_TIPS)
     source = tmp_path / program if program == "tips.c" else SOURCES / program
-    sanitize = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    compiled("cc", *STRICT, *sanitize, "-I", SOURCES, SOURCES / "epsmesh.c", source, "-o", tmp_path / "main", "-lm")
-    compiled(tmp_path / "main", tmp_path / "model.epsm")
+    objects, compiler, words = [], "cc", [*filter(None, [os.environ.get("EPSMESH_FUZZ_MODELS")])]
+    if shutil.which("c++") is not None and program != "tips.c":
+        objects, compiler = [tmp_path / "gradient.o", "-DEPSMESH_GRADIENT"], "c++"
+        compiled(compiler, *SANITIZE, "-O2", "-c", SOURCES / "epsmesh_gradient.cpp", "-o", objects[0])
+    for name, file in (("epsmesh", SOURCES / "epsmesh.c"), ("main", source)):
+        defined = objects[1:2]
+        compiled("cc", *STRICT, *SANITIZE, *defined, "-I", SOURCES, "-c", file, "-o", tmp_path / f"{name}.o")
+    linked = [tmp_path / "epsmesh.o", tmp_path / "main.o", *objects[:1]]
+    compiled(compiler, *SANITIZE, *linked, "-o", tmp_path / "main", "-lm")
+    print(compiled(tmp_path / "main", tmp_path / "model.epsm", *(words if program != "tips.c" else [])))
 
 
 @pytest.mark.parametrize(("compiler", "words"), [("", "there is no C compiler"), ("false", "does not compile")])

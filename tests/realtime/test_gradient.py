@@ -5,23 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.rates import TOOLS, asked_of, errors
 from epsmesh_realtime import BuildError
 from epsmesh_realtime import library as built
 from epsmesh_realtime.table import Near
 from tests.realtime.synthetic import of_place, random_model
 
-TOOLS = {
-    "disc": {"radius": 1e-3},
-    "sphere": {"radius": 2e-3},
-    "cone": {"radius": 2e-3, "angle": 1.2},
-    "blade": {"length": 2e-3, "width": 4e-4, "along": (1.0, 0.3, 0.0)},
-    "bonded": {"radius": 1e-3, "contact": "bonded"},
-}
-# Steps of differences, and sizes of the numbers, in which errors are measured.
-STEPS = {"at": 1e-6, "depth": 4e-9, "young": 4.0, "poisson": 4e-6, "radius": 4e-8, "angle": 4e-5}
-STEPS |= {"length": 4e-8, "width": 4e-8, "along": 1e-5}
-UNITS = {"at": 1e-2, "depth": 1e-4, "young": 1e4, "poisson": 0.1, "radius": 1e-3, "angle": 1.0}
-UNITS |= {"length": 1e-3, "width": 1e-3, "along": 1.0}
 AT = (0.011, 0.007, 0.0)
 
 
@@ -37,43 +26,20 @@ def bodies():
     return {name: replace(model, off=1e-3) for name, model in models.items()}  # a step of `at` may leave the face
 
 
-def asked_of(model, tool, count=12):
-    rng = np.random.default_rng(1)
-    x, y = 0.6 * rng.uniform(-1, 1, (2, count)) * np.array(model.table.reach)[:, None]
-    heights = [model.spot(*place).height for place in zip(x.tolist(), y.tolist(), strict=True)]
-    at = model.origin + np.column_stack([x, y, heights]) @ model.axes
-    numbers = {"depth": rng.uniform(2e-5, 1e-4, count), "poisson": rng.uniform(0.31, 0.48, count), "young": 1e4}
-    return {"tool": "disc" if tool == "bonded" else tool, "at": at, **numbers, **TOOLS[tool]}
-
-
-def difference(model, asked, name, step):
-    """Return dF/d(number) by central differences of fourth order."""
-    value = np.asarray(asked[name], dtype=float)
-    steps = np.eye(3) if name in ("at", "along") else [1.0]
-
-    def slope(along):
-        up, down = (model.query_many(**asked | {name: value + sign * along}).force for sign in (1, -1))
-        return (up - down) / 2
-
-    slopes = [(8 * slope(step * one) - slope(2 * step * one)) / (6 * step) for one in steps]
-    return np.stack(slopes, axis=-1) if len(steps) > 1 else slopes[0]
-
-
 @pytest.mark.parametrize("tool", TOOLS)
 @pytest.mark.parametrize("body", bodies())
 def test_derivatives_are_those_of_differences(body, tool):
     if body == "large" and tool != "sphere":
         pytest.skip("it has balls alone")
     model = bodies()[body]
-    asked = asked_of(model, tool)
-    by = ["at", "depth", "young", "poisson", *(name for name in TOOLS[tool] if name != "contact")]
+    asked = asked_of(model, tool, 12)
+    by = [name for name in asked if name not in ("tool", "contact")]
     found = model.gradient(by=by, **asked)
     assert {*found.touches.status} == {"ok"} and {*found.one_sided} == {""}
     np.testing.assert_array_equal(found.touches.force, model.query_many(**asked).force)
-    size = np.linalg.norm(found.touches.force, axis=1)
-    for name in by:
-        off = np.abs(found.of[name] - difference(model, asked, name, STEPS[name])) * UNITS[name]
-        assert (off.reshape(len(size), -1).max(axis=1) / size).max() < 1e-8, name
+    off = errors(model, asked)
+    assert {*off} == {*by}
+    assert max(off.values()) < 1e-8, off
     alone = model.gradient(by=[by[-1]], threads=3, **asked)
     np.testing.assert_array_equal(alone.of[by[-1]], found.of[by[-1]])
 
@@ -90,7 +56,7 @@ def test_a_ball_on_a_half_space_is_that_of_hertz():
 @pytest.mark.parametrize("tool", TOOLS)
 def test_at_lift_off_derivatives_are_those_of_pressing(tool):
     model = random_model()
-    asked = asked_of(model, tool) | {"poisson": 0.4}
+    asked = asked_of(model, tool, 12) | {"poisson": 0.4}
     by = ("at", "depth", "young", "poisson")
     pressed, above, on = (model.gradient(by=by, **asked | {"depth": depth}) for depth in (1e-7, -1e-9, 0.0))
     assert {*above.touches.status, *on.touches.status} == {"no contact"}

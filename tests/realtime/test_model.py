@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.special import ellipe, ellipk
 
 import epsmesh
-from epsmesh_realtime import Model, ModelError
+from epsmesh_realtime import Friction, History, Model, ModelError, Patch, Tip
 from epsmesh_realtime.file import pack, unpack
 from epsmesh_realtime.model import about, model_of
 from epsmesh_realtime.query import Query, packed_each
@@ -348,3 +348,21 @@ def test_a_model_is_a_dataset_too(tmp_path, kind):
     path.write_bytes(pack(arrays | {"check_x": np.zeros(3), "check_y": np.zeros(4)}))
     with pytest.raises(ModelError, match="damaged"):
         epsmesh.open(path)
+
+
+def test_a_bar_is_a_force_in_newtons_whoever_answers():
+    model, place = random_model(), {"at": AT, "depth": 1e-4}
+    asked = [{"tool": tool, **sizes, **place} for tool, sizes in TOOLS]
+    tip = Tip(lambda x, y: 30 * x**2 + 120 * y**2, 4e-3)
+    relaxing = replace(model, relaxation=((0.4, 2.0),))
+
+    def bars(young):
+        touches = [model.query(young=young, **one) for one in asked]
+        touches += model.query_all([asked[0]], young=young)
+        touches += [Patch(model, tip).query(**place, young=young)]
+        touches += [History(relaxing).query(0.5, young=young, **asked[0])]
+        touches += [Friction(model, 0.3).query(young=young, **asked[0]).touch]
+        assert {touch.status for touch in touches} == {"ok"}
+        return np.array([touch.force_error for touch in touches])
+
+    np.testing.assert_allclose(bars(2e4), 2 * bars(1e4), rtol=1e-9)

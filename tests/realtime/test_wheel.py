@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,9 @@ surface = realtime.read_surface(sys.argv[1])
 assert surface.press("disc", radius=2e-3, at={at}, depth=3e-4)[1].any()
 assert {{"epsmesh.h", "src/file.c", "examples/hand.h"}} <= {{str(file) for file in realtime.source_files()}}
 assert all((realtime.sources() / file).is_file() for file in realtime.source_files())
+asked = {{"radius": 6e-3, "at": {at}, "depth": [3e-4] * 4}}
+assert surface.model.query_many("sphere", threads=2, **asked).force.shape == (4, 3)
+assert surface.model.gradient("sphere", **asked).of["at"].any()
 print(*(float(f) for f in surface.model.query("sphere", radius=6e-3, at={at}, depth=3e-4).force))
 """
 
@@ -43,6 +47,8 @@ def test_a_wheel_answers_without_dolfinx(tmp_path):
     pip = (sys.executable, "-m", "pip")
     run(*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", tmp_path / "dist", tmp_path / "source")
     (wheel,) = (tmp_path / "dist").iterdir()
+    system = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    assert wheel.name.endswith(f"-py3-none-{system}.whl")
     run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "bare")
     (packages,) = (tmp_path / "bare" / "lib").glob("python*/site-packages")
     run(*pip, "install", *offline, "--target", packages, wheel)

@@ -1,9 +1,13 @@
-/* Hold a model file, whole, cut short and damaged, against what epsmesh.h promises: `test_epsmesh MODEL`. */
+/* Hold a model file, whole, cut short and damaged, against what epsmesh.h promises: `test_epsmesh MODEL [FILES]`, the number
+ * of damaged files. With EPSMESH_GRADIENT defined, derivatives are asked as well: link epsmesh_gradient.cpp. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#ifdef EPSMESH_GRADIENT
+#include "epsmesh_gradient.h"
+#endif
 #include "epsmesh_relaxation.h"
 #include "epsmesh_surface.h"
 
@@ -24,6 +28,22 @@ static void expect(int is_right, const char *what) {
     if (is_right) return;
     failures++;
     fprintf(stderr, "failed: %s\n", what);
+}
+
+/* Ask for derivatives: without contact they are 0, of a refusal none. */
+static void ask_slopes(const epsmesh_model *model, const epsmesh_query *query, const epsmesh_touch *touch) {
+#ifdef EPSMESH_GRADIENT
+    static const int32_t numbers[] = {0, 1, 2, 3, 4, 8, 9, 10, 11, 12, 13, 14, 15, 5, 16, -1};
+    double slopes[3 * 16], sum = 0;
+    int32_t side;
+    size_t i;
+    epsmesh_gradient(model, 1, query, touch, 16, numbers, slopes, &side);
+    for (i = 0; i < 3 * 16; i++) sum += slopes[i];
+    if (touch->status == EPSMESH_NO_CONTACT) expect(isfinite(sum) != 0, "without contact derivatives are finite");
+    else if (touch->status != EPSMESH_OK) expect(isnan(slopes[0]) && isnan(slopes[15]), "a refusal has no derivatives");
+#else
+    (void)model, (void)query, (void)touch;
+#endif
 }
 
 /* Ask at random places; a refusal has no numbers, an answer has finite ones. */
@@ -49,6 +69,7 @@ static void ask_around(const epsmesh_model *model, int times) {
             expect(isnan(touch.force[0]) && isnan(touch.stiffness), "a refusal has no numbers");
         }
         expect(strlen(epsmesh_word(touch.status)) > 0, "a status has a word");
+        ask_slopes(model, &query, &touch);
     }
 }
 
@@ -137,10 +158,10 @@ int main(int count, char **words) {
     static epsmesh_model model, damaged;
     static double data[1 << 17];
     unsigned char *part;
-    size_t size, i;
+    size_t size, i, files = count > 2 ? (size_t)strtoul(words[2], NULL, 10) : 30000, sound = 0, cut = 0;
     epsmesh_query query;
-    FILE *file = count == 2 ? fopen(words[1], "rb") : NULL;
-    if (!file) return fprintf(stderr, "usage: test_epsmesh MODEL\n"), 2;
+    FILE *file = count > 1 ? fopen(words[1], "rb") : NULL;
+    if (!file) return fprintf(stderr, "usage: test_epsmesh MODEL [FILES]\n"), 2;
     size = fread(data, 1, sizeof data, file);
     fclose(file);
     expect(epsmesh_load(&model, data, size) == EPSMESH_OK, "the model is read");
@@ -157,11 +178,11 @@ int main(int count, char **words) {
         if (!part) return 2;
         memcpy(part, data, i);
         expect(epsmesh_load(&damaged, part, i) == EPSMESH_NO_MODEL, "a part is no model");
-        free(part);
+        free(part), cut++;
     }
     part = (unsigned char *)malloc(size);
     if (!part) return 2;
-    for (i = 0; i < 30000; i++) {
+    for (i = 0; i < files; i++) {
         int flips = 1 + (int)(draw() % 4);
         memcpy(part, data, size);
         while (flips--) {
@@ -169,6 +190,7 @@ int main(int count, char **words) {
             else part[draw() % (i % 3 ? size : (size_t)HEADER)] = (unsigned char)draw();
         }
         if (epsmesh_load(&damaged, part, size) == EPSMESH_OK) {
+            sound++;
             ask_around(&damaged, 6);
             ask_several(&damaged, 2);
             ask_surface(&damaged, 1);
@@ -181,6 +203,7 @@ int main(int count, char **words) {
         epsmesh_load(&damaged, part, size);
     }
     free(part);
-    printf("%s\n", failures ? "failed" : "passed");
+    printf("%s: %lu files cut short, %lu damaged, of which %lu are models\n", failures ? "failed" : "passed",
+           (unsigned long)cut, (unsigned long)files, (unsigned long)sound);
     return failures ? 1 : 0;
 }
