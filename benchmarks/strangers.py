@@ -27,7 +27,7 @@ from tests.same.outcome import solve
 from tests.same.quantities import number_of
 from tests.same.scenes import seconds
 
-_COUNT = 120
+_COUNT = 150
 _LONG = 12.0  # seconds that a scene may take, as planned
 _TRIES = 20
 _MM = 1e-3
