@@ -10,12 +10,13 @@ import pytest
 from mpi4py import MPI
 from scipy.spatial.transform import Rotation
 
+from epsmesh.run.loads import terms_of
 from epsmesh.shapes.rounded import Rounded
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.study.read import parse
 from epsmesh_realtime import Patch, Tip
 from epsmesh_realtime.export.checks import check_touches, margin, narrowest, random_touches, with_bar, with_full
-from epsmesh_realtime.export.compliance import coarse_mesh, compliances
+from epsmesh_realtime.export.compliance import coarse_mesh, compliances, law_of
 from epsmesh_realtime.export.curved import curved_model, upright
 from epsmesh_realtime.export.forecast import Export
 from epsmesh_realtime.export.full import Full, Solver, Tool
@@ -404,6 +405,48 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
         touch = place.query("disc", radius=radius, at=(0.0, 0.0, 0.0), depth=1e-4)
         # Without what is below the skin it were 19 and 36 % more.
         assert scope.young * touch.force[2] == pytest.approx(force, rel=most)
+
+
+def test_a_capsule_of_a_region_is_a_load_on_the_regular_part():
+    """F of the model is that of a full solve, which does not know the regular part; without the capsule it is less."""
+    nodule = TUMOUR | {"at": ["0 mm", "0 mm", "-8 mm"], "radius": "5 mm", "young": "20 kPa"}
+    wrapped = CYLINDER | {
+        "inclusion": [nodule | {"capsule": {"young": "2 MPa", "thickness": "0.2 mm", "poisson": 0.4}}]
+    }
+    scope = scope_of(study(body=wrapped))
+    region = Region.of(scope.body, 0.5)
+    mesh, law = coarse_mesh(scope.case, region), law_of(scope, scope.poisson)
+    assert law is not None and law.unit == pytest.approx(10e3 / 2 / 1.45)
+    found = [compliances(mesh, region, [(0.0, 0.0)], 0.45, law, terms)[0] for terms in ((), terms_of(scope.case))]
+    forces = [10e3 * 1e-4 / of_disc(c, h, 1.5e-3, 0.45) for c, h, *_ in found]
+    full = Solver({"body": wrapped, "material": SOFT}, "study", 10e3, 0.02).press(
+        Tool("disc", 1.5e-3), (0.0, 0.0), 1e-4, None
+    )
+    assert forces[1] == pytest.approx(full.force, rel=full.error)
+    assert forces[0] < full.force * (1 - full.error)
+
+
+def of_disc(c, h, radius, poisson):
+    """Return depth over force of a frictionless disc, for E = 1."""
+    plane = 1 / (1 - poisson**2)
+    return 0.5 / (plane * radius) + c + radius**2 / 3 * h - 2 / 45 * plane * h**2 * radius**5
+
+
+@pytest.mark.parametrize(
+    ("of_body", "of_region", "told"),
+    [
+        ({}, None, "close to the tool the tissue is then no half-space"),
+        (None, {"tension_only": True}, "a capsule that wrinkles is not"),
+        (None, {"tension": "1 N/m"}, "a tension acts before the tool does"),
+    ],
+)
+def test_capsules_that_are_no_linear_load_have_no_model(of_body, of_region, told):
+    capsule = {"young": "1 MPa", "thickness": "0.1 mm"}
+    body = CYLINDER if of_body is None else CYLINDER | {"capsule": capsule | of_body}
+    if of_region is not None:
+        body = body | {"inclusion": [TUMOUR | {"capsule": capsule | of_region}]}
+    with pytest.raises(ExportError, match=told):
+        scope_of(study(body=body))
 
 
 def test_other_tissue_bounds_what_is_answered_for():

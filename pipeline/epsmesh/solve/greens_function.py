@@ -9,7 +9,7 @@ polynomials in the largest half ball that fits into the body (:class:`~epsmesh.s
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from epsmesh.solve.linear_solver import Level, LinearSolver
 from epsmesh.solve.movement import Motion
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import ElasticSpace, Spaces
+from epsmesh.solve.terms import AddedTerm
 
 # Degree of the elements for R.
 DEGREE = 2
@@ -38,18 +39,21 @@ _MANY = 8
 _TOGETHER = 24
 
 
-def regular_parts(body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None) -> Iterator[Smooth]:
+def regular_parts(
+    body: BodyMesh, forces: Sequence[PointForce], law: MaterialLaw | None = None, terms: Sequence[AddedTerm] = ()
+) -> Iterator[Smooth]:
     """Yield the regular part R per unit of each of ``forces``, within its radius; one factorisation serves all.
 
     The mesh is on this process alone. It may be a half or a quarter, bounded by planes of symmetry through the centre
     of a single force. All forces have the same Poisson's ratio. A ``law`` of several regions is in units of μ at the
-    forces. The half-space is of that material, and the contrast of other regions enters R as loads.
+    forces. The half-space is of that material, and the contrast of other regions enters R as loads, as do ``terms`` of
+    the energy, quadratic ones, in such a body; their moduli are in units of the law's ``unit``.
 
     Raises:
         SolveError: if the solve fails, or if the mesh is too coarse for the radius of a force.
     """
     with Spaces(body) as spaces:
-        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        space = spaces.get(DEGREE, Conditions(unilateral=True, terms=tuple(terms)))
         places = np.asarray(space.space.tabulate_dof_coordinates())
         for force, values in zip(forces, _solved(space, forces, places, law), strict=True):
             yield _fitted(body, force, places, values.reshape(-1, 3))
@@ -97,10 +101,11 @@ def _solved(
 def _beyond(law: MaterialLaw, own: MaterialLaw) -> MaterialLaw:
     """Return the contrast of Lamé's constants of each region to those of the half-space, ``own``."""
     (within,) = own.parameters
-    return MaterialLaw.of(
+    found = MaterialLaw.of(
         [region.lame_lambda - within.lame_lambda for region in law.parameters],
         [region.lame_mu - within.lame_mu for region in law.parameters],
     )
+    return replace(found, unit=law.unit)
 
 
 def _field(force: PointForce, places: FloatArray) -> FloatArray:
@@ -169,7 +174,11 @@ class OnBoundary:
 
 
 def each_on_boundary(
-    body: BodyMesh, boundary: OnBoundary, forces: Sequence[PointForce], law: MaterialLaw | None = None
+    body: BodyMesh,
+    boundary: OnBoundary,
+    forces: Sequence[PointForce],
+    law: MaterialLaw | None = None,
+    terms: Sequence[AddedTerm] = (),
 ) -> Iterator[FloatArray]:
     """Yield R (n, 3) on the whole ``boundary`` for each of ``forces``, of one Poisson's ratio: see ``regular_parts``.
 
@@ -179,7 +188,7 @@ def each_on_boundary(
         SolveError: if the solve fails.
     """
     with Spaces(body) as spaces:
-        space = spaces.get(DEGREE, Conditions(unilateral=True))
+        space = spaces.get(DEGREE, Conditions(unilateral=True, terms=tuple(terms)))
         places = np.asarray(space.space.tabulate_dof_coordinates())
         for values in _solved(space, forces, places, law):
             yield values.reshape(-1, 3)[boundary.among]

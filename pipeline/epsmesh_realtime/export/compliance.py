@@ -15,6 +15,7 @@ from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.solve.far_field import PointForce
 from epsmesh.solve.greens_function import regular_parts
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.terms import AddedTerm
 from epsmesh.stages import stage
 from epsmesh.study.case import Case
 from epsmesh_realtime.export.ranks import ALONE, Ranks
@@ -60,7 +61,7 @@ def _without_quarter_points(arrays: MeshArrays) -> MeshArrays:
 def law_of(scope: Scope, poisson: float) -> MaterialLaw | None:
     """Return a body's tissues in units of μ at its face, for a Poisson's ratio there; None if there is one tissue."""
     tissues = scope.tissues_at(poisson)
-    return MaterialLaw.of(*tissues) if tissues else None
+    return replace(MaterialLaw.of(*tissues), unit=scope.shear_at(poisson)) if tissues else None
 
 
 def per_newton(force: PointForce) -> float:
@@ -77,9 +78,10 @@ def compliances(
     places: Sequence[tuple[float, float]],
     poisson: float,
     law: MaterialLaw | None = None,
+    terms: Sequence[AddedTerm] = (),
 ) -> FloatArray:
     """Return the values to tabulate, shape (places, 9): see :func:`each_compliance`."""
-    return np.array(list(each_compliance(body, region, places, poisson, law)))
+    return np.array(list(each_compliance(body, region, places, poisson, law, terms)))
 
 
 @stage("regular parts")
@@ -89,8 +91,11 @@ def each_compliance(
     places: Sequence[tuple[float, float]],
     poisson: float,
     law: MaterialLaw | None = None,
+    terms: Sequence[AddedTerm] = (),
 ) -> Iterator[FloatArray]:
     """Yield the values to tabulate at each place, shape (9,); ``law`` gives the tissues of a body with several.
+
+    ``terms`` are the capsules of its regions.
 
     The values are c (1/m); h, A₁, A_xy (1/m³); and of R (1/m): R_xz, R_yz, the mean of R_xx and R_yy, half their
     difference, R_xy. See ``epsmesh_realtime.table``.
@@ -102,7 +107,7 @@ def each_compliance(
     for x, y in places:
         centre = (x, y, 0.0), region.room(x, y)
         forces += [PointForce(poisson, *centre), *(SideForce(poisson, *centre, direction) for direction in (0, 1))]
-    parts = regular_parts(body, forces, law)
+    parts = regular_parts(body, forces, law, terms)
     for force, pressed, *pulled in zip(forces[::_FORCES], parts, parts, parts, strict=True):
         at, bent = pressed.at_centre()
         apart, twist = pressed.bends()

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from epsmesh.arrays import FloatArray
+from epsmesh.run.loads import terms_of
 from epsmesh.shapes.body import Layered
 from epsmesh_realtime.export.checks import TOOLS, Check, check_touches, columns, narrowest, random_touches, with_bar
 from epsmesh_realtime.export.compliance import coarse_mesh, each_compliance, law_of
@@ -155,13 +156,14 @@ def _flat(
     ranks.note("meshing the body")
     mesh = coarse_mesh(scope.case, region, ranks=ranks)
     solved: list[tuple[float, float]] = []
+    terms = terms_of(scope.case)
 
     def found(places: Places, poisson: float) -> FloatArray:
         solved.extend(places)
         law, what = law_of(scope, poisson), f"places solved for ν = {poisson:.3g}"
         given = (region, poisson)
         return np.array(
-            ranks.keeping(places, lambda some: each_compliance(mesh, region, some, poisson, law), what, given)
+            ranks.keeping(places, lambda some: each_compliance(mesh, region, some, poisson, law, terms), what, given)
         )
 
     table, error = tabulate(region, scope.poissons, found, _SHARE * accuracy)

@@ -19,6 +19,7 @@ from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.solve.far_field import PointForce
 from epsmesh.solve.greens_function import OnBoundary, each_on_boundary
 from epsmesh.solve.physics import MaterialLaw
+from epsmesh.solve.terms import AddedTerm
 from epsmesh.stages import stage
 from epsmesh_realtime.export.compliance import per_newton
 from epsmesh_realtime.export.disc import Disc
@@ -54,7 +55,7 @@ class LoadedBody:
     ``law`` gives the tissues in units of μ at the face, for its Poisson's ratio; None if there is one tissue. R is not
     tested within ``next`` (m) of a force. A node is on the face if its height differs by at most ``off`` (m). ``doubt``
     is the error of R by the mesh, times the distance to the nearest side or the bottom, beyond what tests show. Each of
-    ``ranks`` has the whole mesh, and solves for some of the places.
+    ``ranks`` has the whole mesh, and solves for some of the places. ``terms`` are capsules of its regions.
     """
 
     mesh: BodyMesh
@@ -65,6 +66,7 @@ class LoadedBody:
     off: float = 0.0
     doubt: float = 0.0
     ranks: Ranks = ALONE
+    terms: tuple[AddedTerm, ...] = ()
 
     @cached_property
     def boundary(self) -> OnBoundary:
@@ -77,7 +79,7 @@ class LoadedBody:
 
         def each(some: Sequence[Place]) -> Iterator[FloatArray]:
             forces = [self.force(place, poisson) for place in some]
-            found = each_on_boundary(self.mesh, self.boundary, forces, self.law(poisson))
+            found = each_on_boundary(self.mesh, self.boundary, forces, self.law(poisson), self.terms)
             return (per_newton(force) * values for force, values in zip(forces, found, strict=True))
 
         # Meshes may differ from one export to the next.

@@ -70,12 +70,18 @@ class Scope:
         """
         if not self.body.regions:
             return None
-        case = self.case
-        if poisson != self.poisson:
-            case = replace(case, material=case.material.model_copy(update={"poisson": poisson}))
-        mu = surface_tissue(case).lame[1]
+        case, mu = self._case_at(poisson), self.shear_at(poisson)
         lambdas, shears = zip(*((a / mu, b / mu) for a, b in (tissue.lame for tissue in case.tissues)), strict=True)
         return lambdas, shears
+
+    def shear_at(self, poisson: float) -> float:
+        """Return μ (Pa) of the tissue at the face, with another Poisson's ratio of the material."""
+        return surface_tissue(self._case_at(poisson)).lame[1]
+
+    def _case_at(self, poisson: float) -> Case:
+        if poisson == self.poisson:
+            return self.case
+        return replace(self.case, material=self.case.material.model_copy(update={"poisson": poisson}))
 
 
 def scope_of(study: Study) -> Scope:

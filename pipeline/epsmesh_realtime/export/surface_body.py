@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull
 
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.mesh.of_case import mesh_arrays
+from epsmesh.run.loads import terms_of
 from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.shell import Shell
 from epsmesh.solve.far_field import PointForce
@@ -48,7 +49,8 @@ def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE
             return PointForce(poisson, (*place, 0.0), region.room(*place))
 
         off = _ON_FACE * region.thickness
-        return LoadedBody(coarse_mesh(scope.case, region, ranks=ranks), region, on_plane, law, off=off, ranks=ranks)
+        mesh, terms = coarse_mesh(scope.case, region, ranks=ranks), terms_of(scope.case)
+        return LoadedBody(mesh, region, on_plane, law, off=off, ranks=ranks, terms=terms)
     return _curved(scope, model, ranks)
 
 
@@ -85,7 +87,8 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> LoadedBody:
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
         raise ExportError("part of the body is above the model's region, where its displacement cannot be tabulated")
-    return LoadedBody(mesh, region, on_face, partial(law_of, scope), _NEXT * radius, model.off, _DOUBT, ranks)
+    law, terms = partial(law_of, scope), terms_of(scope.case)
+    return LoadedBody(mesh, region, on_face, law, _NEXT * radius, model.off, _DOUBT, ranks, terms)
 
 
 def _mesh(scope: Scope, region: Region, ranks: Ranks) -> BodyMesh:

@@ -285,6 +285,7 @@ FEATURES: dict[str, Feature] = {
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
     "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
+    "terms of loads": Feature("load", lambda s: bool(s.load.terms)),
     "capsule": _of_capsule(),
     "capsule that bears compression": _of_capsule(
         ".tension_only", lambda one, _: not one.tension_only, write=lambda _: False
@@ -292,6 +293,9 @@ FEATURES: dict[str, Feature] = {
     "capsule that wrinkles under the tool": _of_capsule(
         ".tension_only", lambda one, body: one.tension_only and one in body.skins, write=lambda _: True
     ),
+    "capsule that wrinkles": _of_capsule(".tension_only", lambda one, _: one.tension_only, write=lambda _: True),
+    "capsule on the surface": _of_capsule("", lambda one, body: one in body.skins),
+    "capsule of a hollow region": _of_capsule("", lambda one, body: one.on in body.cavities),
     "tension of the capsule": _of_capsule("", lambda one, _: one.tension > 0),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},
     # Of a case: the sections of a scene have none.

@@ -109,7 +109,13 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "rounded edge": "probe.edge: real-time models have sharp edges. Omit it",
         "friction": "probe.friction: real-time models are frictionless, `epsmesh.realtime.Friction` adds it. Omit it",
         "loads": "[load]: gravity, tractions and pressure in hollow regions have no real-time model",
-        "terms": "[load], body.capsule: springs, capsules and other terms have no real-time model",
+        "terms of loads": "[load]: springs and other terms have no real-time model",
+        "capsule on the surface": "{key}: a capsule holds the face against motion along it, and close to the tool the "
+        "tissue is then no half-space, as a real-time model has it. Capsules of inner regions have a model",
+        "capsule that wrinkles": "{key}: real-time models are linear, and a capsule that wrinkles is not. Omit it",
+        "tension of the capsule": "{key}: a tension acts before the tool does, and a real-time model begins at rest. "
+        "Omit the tension",
+        "capsule of a hollow region": "{key}: capsules of hollow regions have no real-time model. Omit it",
         "fibres": "{key}: fibres have a direction, and the half-space of a real-time model has none",
         "varying stiffness": "{key}: the half-space of a real-time model has one modulus. Give a value",
         "time steps": "material.relaxation: all tissue of a real-time model relaxes alike. Omit the relaxation of "
