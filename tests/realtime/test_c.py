@@ -112,6 +112,17 @@ NEAR = Near(np.array([[[1.1, 0.08]], [[0.9, -0.1]]]), 1.2, 2e-3, 0.1, 0.08)
 SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory):
+    """The evaluator and its derivatives with sanitizers, and the compiler that links them."""
+    folder = tmp_path_factory.mktemp("objects")
+    compiled("cc", *STRICT, *SANITIZE, "-c", SOURCES / "epsmesh.c", "-o", folder / "epsmesh.o")
+    if shutil.which("c++") is None:
+        return "cc", (), [folder / "epsmesh.o"]
+    compiled("c++", *SANITIZE, "-O2", "-c", SOURCES / "epsmesh_gradient.cpp", "-o", folder / "gradient.o")
+    return "c++", ("-DEPSMESH_GRADIENT",), [folder / "epsmesh.o", folder / "gradient.o"]
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("program", "kind", "parts"),
@@ -123,22 +134,17 @@ SANITIZE = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
         ("tips.c", {}, {}),
     ],
 )
-def test_a_damaged_file_breaks_nothing(tmp_path, program, kind, parts):
+def test_a_damaged_file_breaks_nothing(tmp_path, objects, program, kind, parts):
     """$EPSMESH_FUZZ_MODELS, of `make fuzz`, is the number of damaged files of each model; otherwise it is 30,000."""
     made = random_surface(**kind)
     write_model(tmp_path / "model.epsm", replace(made.model, **parts), {}, {"title": "random"}, made.table)
     (tmp_path / "tips.c").write_text(_TIPS)
     source = tmp_path / program if program == "tips.c" else SOURCES / program
-    objects, compiler, words = [], "cc", [*filter(None, [os.environ.get("EPSMESH_FUZZ_MODELS")])]
-    if shutil.which("c++") is not None and program != "tips.c":
-        objects, compiler = [tmp_path / "gradient.o", "-DEPSMESH_GRADIENT"], "c++"
-        compiled(compiler, *SANITIZE, "-O2", "-c", SOURCES / "epsmesh_gradient.cpp", "-o", objects[0])
-    for name, file in (("epsmesh", SOURCES / "epsmesh.c"), ("main", source)):
-        defined = objects[1:2]
-        compiled("cc", *STRICT, *SANITIZE, *defined, "-I", SOURCES, "-c", file, "-o", tmp_path / f"{name}.o")
-    linked = [tmp_path / "epsmesh.o", tmp_path / "main.o", *objects[:1]]
-    compiled(compiler, *SANITIZE, *linked, "-o", tmp_path / "main", "-lm")
-    print(compiled(tmp_path / "main", tmp_path / "model.epsm", *(words if program != "tips.c" else [])))
+    linker, defined, made_before = objects
+    compiled("cc", *STRICT, *SANITIZE, *defined, "-I", SOURCES, "-c", source, "-o", tmp_path / "main.o")
+    compiled(linker, *SANITIZE, tmp_path / "main.o", *made_before, "-o", tmp_path / "main", "-lm")
+    files = [*filter(None, [os.environ.get("EPSMESH_FUZZ_MODELS")])] if program != "tips.c" else []
+    print(compiled(tmp_path / "main", tmp_path / "model.epsm", *files))
 
 
 @pytest.mark.parametrize(("compiler", "words"), [("", "there is no C compiler"), ("false", "does not compile")])

@@ -16,14 +16,13 @@ AT = (0.011, 0.007, 0.0)
 
 def bodies():
     near = Near(np.array([[[1.1, 0.08]], [[0.9, -0.1]]]), 1.2, 2e-3, 0.1, 0.08)
-    models = {
+    return {
         "box": random_model(),
         "cylinder": random_model(is_round=True),
         "turned": random_model(is_round=True, is_even=False, turned=True),
         "organ": random_model(curved=True, is_even=False, turned=True),
         "large": replace(random_model(), pairs=None, near=near),
     }
-    return {name: replace(model, off=1e-3) for name, model in models.items()}  # a step of `at` may leave the face
 
 
 @pytest.mark.parametrize("tool", TOOLS)
