@@ -15,7 +15,7 @@ python=/usr/bin/python3
 venv=.venv
 # EXTRAS=run installs what studies need, without tests and documentation: half of the Python packages. A venv keeps what
 # it has.
-extras=dev,docs,images,repair,fmi
+extras=dev,docs,images,repair,fmi,simulators
 if [[ ${EXTRAS:-} == run ]] && ! compgen -G "$venv/lib/python*/site-packages/pytest" >/dev/null; then
     extras=images,repair
 fi

@@ -143,10 +143,14 @@ def sources() -> Path:
 
 
 def source_files() -> list[Path]:
-    """Return the files in that folder, relative to it, without tests."""
+    """Return the text files in that folder, relative to it, without tests."""
     patterns, folder = ("*.[ch]", "*.cpp", "src/*.c", "examples/*", "fmu/*.c"), sources()
     found = (path for pattern in patterns for path in sorted(folder.glob(pattern)))
-    return [path.relative_to(folder) for path in found if path.is_file() and not path.name.startswith("test_")]
+    return [
+        path.relative_to(folder)
+        for path in found
+        if path.is_file() and path.suffix != ".epsm" and not path.name.startswith("test_")
+    ]
 
 
 def _is_checkout() -> bool:

@@ -1,4 +1,4 @@
-"""The wheel of epsmesh-realtime: it builds, and answers in a venv that has numpy and nothing else."""
+"""The wheel of epsmesh-realtime: it builds, and answers in a venv that has numpy, or MuJoCo too, and nothing else."""
 
 import shutil
 import subprocess
@@ -38,25 +38,69 @@ def run(*words: object) -> str:
     return done.stdout
 
 
-def test_a_wheel_answers_without_dolfinx(tmp_path):
-    surface = write_surface(tmp_path / "box.epsm")
-    shutil.copytree(
-        SOURCES.parent, tmp_path / "source", ignore=shutil.ignore_patterns(".built", "build", "*.so", "__pycache__")
-    )
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """Build the wheel; return what makes a venv of it and of other installed packages, and returns its Python."""
+    folder = tmp_path_factory.mktemp("wheel")
+    ignored = shutil.ignore_patterns(".built", "build", "*.so", "__pycache__")
+    shutil.copytree(SOURCES.parent, folder / "source", ignore=ignored)
     offline = ("--no-deps", "--no-index", "--disable-pip-version-check", "--quiet")
     pip = (sys.executable, "-m", "pip")
-    run(*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", tmp_path / "dist", tmp_path / "source")
-    (wheel,) = (tmp_path / "dist").iterdir()
+    run(*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", folder / "dist", folder / "source")
+    (wheel,) = (folder / "dist").iterdir()
     system = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     assert wheel.name.endswith(f"-py3-none-{system}.whl")
-    run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "bare")
-    (packages,) = (tmp_path / "bare" / "lib").glob("python*/site-packages")
-    run(*pip, "install", *offline, "--target", packages, wheel)
-    folder = Path(np.__file__).parent
-    for found in (folder, folder.parent / "numpy.libs"):
-        if found.is_dir():
-            (packages / found.name).symlink_to(found)
+
+    def made(name, *others):
+        run(sys.executable, "-m", "venv", "--without-pip", folder / name)
+        (packages,) = (folder / name / "lib").glob("python*/site-packages")
+        run(*pip, "install", *offline, "--target", packages, wheel)
+        for module in (np, *others):
+            place = Path(module.__file__).parent
+            for found in (place, place.parent / f"{place.name}.libs"):
+                if found.is_dir():
+                    (packages / found.name).symlink_to(found)
+        return folder / name / "bin" / "python"
+
+    return made
+
+
+def test_a_wheel_answers_without_dolfinx(tmp_path, bare):
+    surface = write_surface(tmp_path / "box.epsm")
     (tmp_path / "ask.py").write_text(_ASK.format(at=AT))
-    said = run(tmp_path / "bare" / "bin" / "python", "-I", tmp_path / "ask.py", tmp_path / "box.epsm")
+    said = run(bare("numpy"), "-I", tmp_path / "ask.py", tmp_path / "box.epsm")
     known = surface.model.query("sphere", radius=6e-3, at=AT, depth=3e-4)
     np.testing.assert_allclose([float(word) for word in said.split()], known.force, rtol=1e-12)
+
+
+_FEEL = """
+import importlib.util, runpy
+import mujoco, numpy as np
+import epsmesh_realtime as realtime
+assert not any(importlib.util.find_spec(name) for name in ("dolfinx", "scipy", "xarray", "epsmesh"))
+folder = realtime.sources() / "examples"
+Tissue = runpy.run_path(str(folder / "epsmesh_mujoco.py"))["Tissue"]
+model = mujoco.MjModel.from_xml_string('''<mujoco><option gravity="0 0 0" timestep="0.001"/><worldbody>
+  <body name="tool"><freejoint/><geom name="tip" size=".008" mass=".05" contype="0" conaffinity="0"/></body>
+</worldbody></mujoco>''')
+data, tissue = mujoco.MjData(model), Tissue(model, str(folder / "liver.epsm"), "tip")
+face = tissue.face
+normal = face.spot(0, 0).normal @ face.axes
+data.qpos[:3] = face.origin + face.spot(0, 0).height * face.axes[2] + 0.009 * normal
+data.qvel[:3] = -0.05 * normal + 0.03 * face.axes[0]
+mujoco.set_mjcb_passive(tissue)
+forces = []
+for _ in range(250):
+    mujoco.mj_step(model, data)
+    forces.append(float(np.linalg.norm(tissue.touch.force)))
+print(max(forces), forces[0], forces[-1], float(np.linalg.norm(data.qvel[:3])))
+"""
+
+
+def test_a_tool_feels_a_liver_in_mujoco_from_two_wheels_alone(tmp_path, bare):
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed (the extra `simulators`)")
+    (tmp_path / "feel.py").write_text(_FEEL)
+    most, first, last, speed = map(float, run(bare("mujoco", mujoco), "-I", tmp_path / "feel.py").split())
+    assert first == last == 0 < most
+    # It has bounced off without loss, but for what steps of 1 ms change.
+    assert speed == pytest.approx(np.hypot(0.05, 0.03), rel=1e-2)
