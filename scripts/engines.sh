@@ -1,0 +1,18 @@
+#!/bin/bash
+# Make .venv-engines with the simulators for `make engines`. They come from PyPI.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+venv=.venv-engines
+wanted=(mujoco==4.0.0 newton==1.8.0 warp-lang==1.19.0 pybullet==3.2.7 numpy)
+stamp=$venv/.epsmesh-engines
+state=$(sha256sum <scripts/engines.sh)
+[[ -f $stamp && $(<"$stamp") == "$state" ]] && exit 0
+echo "engines: making $venv"
+/usr/bin/python3 -m venv --clear "$venv"
+# A pip configured for --user would install beside the venv.
+pip=(env PIP_USER=0 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-input)
+"${pip[@]}" --only-binary :all: "${wanted[@]}"
+"$venv/bin/python" -c 'import mujoco, newton, pybullet'
+echo "$state" >"$stamp"
+echo "engines: done"
