@@ -250,6 +250,12 @@ def _accuracy(study: Study) -> None:
     study["mesh"]["accuracy"] = "5 %"
 
 
+def _support(study: Study) -> None:
+    """Let the body rest on a support that lets go, and find the contact of the tool with that of it."""
+    study["body"].update(fixed="none", support={"on": "bottom", "friction": "stick"})
+    study["probe"].setdefault("contact", "unilateral")
+
+
 _DRAW = """
 import sys, gmsh
 gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
@@ -304,6 +310,7 @@ FEATURES = (
     Feature("frictionless", "contact", _update("probe", contact="frictionless")),
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),
+    Feature("support that lets go", "support", _support),
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),

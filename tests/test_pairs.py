@@ -41,6 +41,7 @@ def folder(tmp_path_factory):
 _OF_SCHEMA = (
     "has no layer",
     "has no region",
+    "has no support",
     "a tool that is inserted",
     "excludes [probe.insertion]",
     "would touch the body",

@@ -114,7 +114,7 @@ def write(name: str, value: Value, unit: str | None = None) -> str:
     if isinstance(value, str):
         return value
     if value == inf:
-        return "stick" if name == "friction" else "full"
+        return "stick" if name.endswith("friction") else "full"
     factor, word = readable(name, unit)
     return "" if isnan(value) else f"{value * factor:.6g} {word}".rstrip()
 

@@ -150,7 +150,7 @@ def test_what_is_below_its_layers_is_a_lower_body(shape):
         low, top = whole.heights
         assert found.heights == pytest.approx((low + depth, top))
         assert found.volume / whole.volume == pytest.approx((top - depth - low) / (top - low))
-        assert found.support.edges() == pytest.approx([-9e-3 + depth])
+        assert found.hold.edges() == pytest.approx([-9e-3 + depth])
         assert found.interfaces == pytest.approx([end + depth for end in whole.interfaces[number:]])
         assert found.layer == whole.layer[number:]
 
@@ -183,8 +183,8 @@ def test_mirror_planes_and_half_plane_are_true(shape, fixed):
             at = points @ image.T
             off = np.min([np.abs(other.distance(at)) for group in surfaces.values() for other in group], axis=0)
             assert off.max() < 1e-12
-            held = [found.support.holds(surfaces, point[None], 1e-9) for point in points]
-            assert held == [found.support.holds(surfaces, point[None], 1e-9) for point in at]
+            held = [found.hold.holds(surfaces, point[None], 1e-9) for point in points]
+            assert held == [found.hold.holds(surfaces, point[None], 1e-9) for point in at]
 
 
 def test_the_middle_is_the_axis_and_what_is_round_has_no_corner(a_body):

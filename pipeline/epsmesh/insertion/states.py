@@ -94,9 +94,9 @@ class InsertionScene(ABC, Generic[Tool]):
         self.toughness, self.is_pending = tool.toughness, False
         top, frame = body.heights[1], tool.frame_on(body)
         side = tool.gap(body, frame) + tool.half_width
-        self.beside, self.is_held = min(kept, side), side <= kept and body.support.gap(0.0) == 0.0
+        self.beside, self.is_held = min(kept, side), side <= kept and body.hold.gap(0.0) == 0.0
         self.interfaces = interfaces([body])
-        self.bottom = min(top - level for level in (body.heights[0], *body.support.edges()))
+        self.bottom = min(top - level for level in (body.heights[0], *body.hold.edges()))
         self.layers = tuple(self._layers(body, material))
 
     def _layers(self, body: "Layered", material: "Material") -> Iterator[Tissue]:

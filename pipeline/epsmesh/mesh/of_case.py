@@ -178,7 +178,7 @@ def meridian_of(case: Case) -> Meridian | EllipticMeridian:
     Raises:
         ValueError: if its body is not axisymmetric.
     """
-    body, fixed = case.body.half_plane(), case.body.support.on_half_plane()
+    body, fixed = case.body.half_plane(), case.body.hold.on_half_plane()
     if isinstance(body, HalfEllipse) and isinstance(fixed, float) and not case.is_truncated:
         return EllipticMeridian(body.radius, body.semi_height, case.probe.circumradius, fixed)
     if not isinstance(body, Rectangle):

@@ -29,7 +29,7 @@ PHYSICS_VERSION = 16
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
 # Keys of a body that its mesh does not depend on.
-_NOT_MESHED = ("capsule", "is_loaded")
+_NOT_MESHED = ("capsule", "is_loaded", "support")
 _MANY = 200_000  # sections of a large study
 # Keys of what follows from the elastic force without a solve: pipeline/epsmesh/report/history.py.
 _OF_TIME = ("history", "relaxation")
@@ -77,6 +77,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     )
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
+    tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
@@ -136,8 +137,9 @@ def operator_key(case: Case) -> str:
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
+    rests = [] if case.body.resting is None else [text_of(case.body.resting)]
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
-    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *fields, *shape])
+    return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *rests, *fields, *shape])
 
 
 def normalised(case: Case) -> Case:
@@ -186,6 +188,8 @@ def _in_units_of(stress: float, body: Body) -> Body:
 @lru_cache(_MANY)
 def _body_text(body: Body, stress: float | None = None) -> str:
     """Return a body in canonical form, moduli in units of ``stress`` (Pa); without it, only the geometry."""
+    if (rest := body.resting) is not None:  # it has the mesh of a body that is fixed there
+        body = body.model_copy(update={"fixed": rest.on, "support": None})
     if not body.pieces:
         return text_of(body, _NOT_MESHED)
     content = body.model_dump(exclude={*_NOT_MESHED})

@@ -139,6 +139,6 @@ def scales_along(cases: Sequence[Case], points: FloatArray) -> FloatArray:
     body = cases[0].body
     lengths = [np.array([min(body.thickness(case.frame), body.gap(case.frame.point)) for case in cases])]
     lengths += [np.abs(piece.surface.distance(points)) for piece in body.embedded]
-    held = body.support.distance(body.surfaces(), points)
+    held = body.hold.distance(body.surfaces(), points)
     lengths += [] if held is None else [held]
     return np.asarray(np.maximum(np.min(lengths, axis=0), 0.0) + half_width_of(cases[0]))

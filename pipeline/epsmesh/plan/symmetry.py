@@ -66,7 +66,7 @@ def _is_held_below_stiffer(case: Case) -> bool:
     The displacement there goes like r to a power below ½, which the meridian's error bar does not cover: the error was
     1.1 error bars at 1.7 times the modulus, and 1.4 at 10 times.
     """
-    level, interfaces = case.body.support.on_half_plane(), case.body.interfaces
+    level, interfaces = case.body.hold.on_half_plane(), case.body.interfaces
     layers = [*case.tissues[1:], case.tissues[0]][: len(interfaces) + 1]
 
     def is_stiffer(above: Tissue, below: Tissue, z: float) -> bool:

@@ -62,7 +62,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy=solution.energy,
         energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
-        largest=solution.largest,
+        largest=solution.largest | of_rest(solution.contact, solution.reaction_bars),
         **_of_contact(solution.contact, has_history=solution.history is not None),
         **_of_loads(case, solution),
         balance=solution.balance,
@@ -126,6 +126,24 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
     found |= {f"{name}_error": nan if has_history else getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
     found |= {"contact_area": contact.area, "contact_area_error": contact.bar}
     return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
+
+
+def of_rest(contact: ContactResult | None, bars: Vector) -> dict[str, float]:
+    """Return what a record has of a support that lets go, by the names in the dataset; ``bars`` (N) are those of F.
+
+    Its force differs from that of the tool by the weight of the body, and has the same error.
+    """
+    if contact is None or contact.rest is None:
+        return {}
+    rest = contact.rest
+    across = zip(rest.normal, rest.force, bars, strict=True)
+    parts = [(n * f, abs(n) * bar) for n, f, bar in across if abs(n) > _ROUNDING]
+    return {
+        "support_force": sum(force for force, _ in parts),
+        "support_force_error": sum(bar for _, bar in parts),
+        "lift_off_area": rest.lifted,
+        "lift_off_area_error": rest.bar * rest.area,
+    }
 
 
 def _of_loads(case: Case, solution: Solution) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from epsmesh.shapes.tissue import FIBRE, Tissue
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.active_set import ContactError
+from epsmesh.solve.contact.bed import Bed, plane
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.far_field import BodyField, PointForce
 from epsmesh.solve.history import Course
@@ -126,15 +127,32 @@ def conditions_of(case: Case) -> Conditions:
     front, tip = _fronts_of(case)
     bonded, is_found = case.way.constraint is Constraint.BONDED, case.way.is_found
     return Conditions(
-        bonded=bonded, unilateral=is_found, front=front, tip=tip, terms=terms_of(case), variation=variation_of(case)
+        bonded=bonded,
+        unilateral=is_found,
+        front=front,
+        tip=tip,
+        terms=terms_of(case),
+        variation=variation_of(case),
+        released=case.body.resting is not None,
     )
 
 
 def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     *_, first = first_touch(case.body, case.probe, case.frame)
-    tool = tool_at(case.probe, case.frame.upright, first)
+    tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case))
     return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
+
+
+def beds_of(case: Case) -> tuple[Bed, ...]:
+    """Return the plane on which the body of ``case`` rests, for the same mesh; nothing if its support is fixed."""
+    resting, turn = case.body.resting, case.frame.turn
+    if resting is None:
+        return ()
+    low, _ = case.body.heights
+    turned = np.eye(3) if turn is None else turn
+    x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
+    return (Bed(plane(turned @ np.array([0.0, 0.0, low]), np.array([x, y, z])), (x, y, z), resting.friction > 0),)
 
 
 def normal_of(case: Case) -> Vector:

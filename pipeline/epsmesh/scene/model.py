@@ -126,7 +126,7 @@ def build(scene: Scene) -> list[int]:
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     printed, beside = _add_contact(scene, volumes)
-    heights = (*scene.body.support.edges(), *scene.body.interfaces)
+    heights = (*scene.body.hold.edges(), *scene.body.interfaces)
     tools = [*printed, *((2, _add_level(scene.units(height))) for height in heights)]
     tools += draw_inclusions(scene.body.inclusion, scene.units)
     first = len(volumes) + len(tools)
@@ -289,7 +289,7 @@ def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
         return scene.is_cut and bool(np.all(np.abs(scene.cut_face.distance(points)) < close))
 
     def is_held(points: Any) -> bool:
-        return scene.body.support.holds(surfaces, points, close)
+        return scene.body.hold.holds(surfaces, points, close)
 
     mirrors = [(MIRROR[plane], partial(on_mirror, axis="xy".index(plane))) for plane in scene.mirrors]
     return [*mirrors, (CUT, on_cut), (FIXED, is_held)]

@@ -13,6 +13,7 @@ from epsmesh.shapes.frame import Frame, Units, Vector
 from epsmesh.shapes.half_plane import HalfPlane
 from epsmesh.shapes.part import Around, is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Region
+from epsmesh.shapes.resting import Resting
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.support import Below, Fixed, Support, support_of
@@ -41,7 +42,7 @@ class Body(Section, ABC):
         Fixed,
         Words(
             "Support of the body: its bottom, its sides, both, or all tissue below a height. "
-            'Displacements are zero there. "none": a term of [load] holds the body.',
+            'Displacements are zero there. "none": a term of [load] holds the body, or [body.support].',
             '"bottom"',
             takes='"bottom" | "sides" | "bottom+sides" | {below = length} | "none"',
         ),
@@ -181,10 +182,15 @@ class Body(Section, ABC):
         number = 1 + sum(height < end for end in self.interfaces)
         return number if self.is_filled or number <= len(self.interfaces) else 0
 
+    @property
+    def resting(self) -> Resting | None:
+        """The support that lets go, on which it rests; None if its support is fixed."""
+        return None
+
     @cached_property
-    def support(self) -> Support:
-        """The fixed part of its boundary."""
-        return support_of(self.fixed)
+    def hold(self) -> Support:
+        """The fixed part of its boundary, or the part that rests on a support that lets go."""
+        return support_of(self.fixed if self.resting is None else self.resting.on)
 
     # ---- size -----------------------------------------------------------------------------------------
 
@@ -326,6 +332,15 @@ class Layered(Drawn):
     """A body with a flat top, and horizontal layers if any."""
 
     layer: Annotated[tuple[Layer, ...], Words("Layers of other materials, from the top down.", "[[body.layer]]")] = ()
+    support: Annotated[
+        Resting | None,
+        Words("Support that lets go: a rigid plane on which the body rests.", "[body.support]", default="none"),
+    ] = None
+
+    @property
+    def resting(self) -> Resting | None:
+        """The support that lets go."""
+        return self.support
 
     @property
     def interfaces(self) -> tuple[float, ...]:

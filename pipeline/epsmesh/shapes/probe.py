@@ -3,9 +3,9 @@
 from abc import abstractmethod
 from functools import lru_cache
 from math import hypot, inf
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
+from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
 from epsmesh.arrays import BoolArray, FloatArray
@@ -13,6 +13,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.crack import Crack
 from epsmesh.shapes.footprint import Footprint
 from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.friction import STICK, Friction
 from epsmesh.shapes.history import History
 from epsmesh.shapes.revolved import Revolved
 from epsmesh.shapes.section import Problems, Words, in_mm
@@ -24,8 +25,6 @@ PLANES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
 _MANY = 200_000  # cached pairs of body and probe, enough for a large study
 
 Contact = Literal["bonded", "frictionless", "unilateral"]
-# The word for friction without limit, and the largest coefficient besides.
-STICK, MOST_FRICTION = "stick", 2.0
 # Linear elasticity, up to this depth in half widths: strain under a flat tool is of order depth / radius.
 LINEAR = 0.10
 ON_EDGE = 1e-6  # a point is on the edge of a footprint within this share
@@ -35,20 +34,6 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
     if len(at) not in (2, 3):
         raise PydanticCustomError("not_supported", "must be a list of 2 or 3 values")
     return at
-
-
-def _coefficient(value: Any) -> float:
-    """Return a coefficient of friction; infinity for tissue that sticks."""
-    if value == STICK:
-        return inf
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (is_number and 0 <= value <= MOST_FRICTION):
-        raise PydanticCustomError("not_supported", f'must be a number from 0 to {MOST_FRICTION:g}, or "{STICK}"')
-    return float(value)
-
-
-_NUMBER_OR_WORD = {"anyOf": [{"type": "number", "minimum": 0, "maximum": MOST_FRICTION}, {"const": STICK}]}
-Friction = Annotated[float, BeforeValidator(_coefficient), WithJsonSchema(_NUMBER_OR_WORD)]
 
 
 class Probe(Footprint):

@@ -111,7 +111,7 @@ class Slit:
     def room(self, body: Body) -> float:
         """Return the distance (m) from the front to the nearest of: blade, interface of layers, bottom, support."""
         top = body.heights[1]
-        ends = (*body.interfaces, *body.support.edges(), body.heights[0])
+        ends = (*body.interfaces, *body.hold.edges(), body.heights[0])
         return min(self.clear, *(abs(end - top + self.depth) for end in ends))
 
     def room_at_tip(self, body: Body) -> float:

@@ -1,6 +1,6 @@
 """Prescribed components of the displacement, independent of their values, and the position of a slit's front."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -54,7 +54,8 @@ class Conditions:
     With ``unilateral`` contact the footprint prescribes nothing: the active set does. The support is fixed. On planes
     of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
     faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
-    ``terms`` act on the body besides its law, whose stiffness has a ``variation``, if it varies within regions.
+    ``terms`` act on the body besides its law, whose stiffness has a ``variation``, if it varies within regions. A
+    support that is ``released`` fixes nothing: the active set does.
     """
 
     bonded: bool = True
@@ -63,11 +64,12 @@ class Conditions:
     tip: Front | None = None
     terms: tuple[AddedTerm, ...] = ()
     variation: Variation | None = None
+    released: bool = False
 
     @property
     def without_footprint(self) -> "Conditions":
         """The same without a tool."""
-        return Conditions(bonded=False, unilateral=True, terms=self.terms, variation=self.variation)
+        return replace(WITHOUT_FOOTPRINT, terms=self.terms, variation=self.variation, released=self.released)
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -89,4 +91,4 @@ class Conditions:
 
 
 # Conditions without a footprint: no tool, or one whose active set alone prescribes displacements.
-WITHOUT_FOOTPRINT = Conditions().without_footprint
+WITHOUT_FOOTPRINT = Conditions(bonded=False, unilateral=True)

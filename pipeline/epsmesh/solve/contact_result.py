@@ -20,10 +20,10 @@ class ContactResult:
     friction. Each has a 95 % bar in its own unit, NaN if unknown; ``rubbing`` is what those of the first two follow
     from.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
-    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
-    tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
-    size of elements there. ``shift`` (m) is how far loads move the place of contact across the axis, NaN where the tool
-    follows.
+    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere
+    the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
+    bar by the size of elements there. ``rest`` is what a support that lets go does. ``shift`` (m) is how far loads
+    move the place of contact across the axis, NaN where the tool follows.
     """
 
     area: float
@@ -41,6 +41,7 @@ class ContactResult:
     is_ended: bool = False
     at_edge: float = 0.0
     shift: float = nan
+    rest: "RestResult | None" = None
 
     @property
     def radius(self) -> float:
@@ -67,6 +68,22 @@ class ContactResult:
             self, slip_area=whole.share * self.area, friction_force=whole.force, torque=torque, rubbing=whole
         )
         return replace(found, torque=0.0, torque_bar=0.0) if mirrored else found
+
+
+@dataclass(frozen=True)
+class RestResult:
+    """A body on a support that lets go: the ``force`` (3), N, of the support on it, the ``area`` (m²) in contact, and
+    that which has ``lifted`` off (m²).
+
+    ``normal`` (3) is the unit vector from the support into the body. ``bar`` is the relative 95 % bar on the area, NaN
+    if unknown.
+    """
+
+    force: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    area: float
+    lifted: float
+    bar: float = nan
 
 
 @dataclass(frozen=True)

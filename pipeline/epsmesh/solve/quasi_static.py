@@ -87,7 +87,8 @@ class QuasiStaticProblem(Problem):
                 body.
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
-        check_hold(self.elements.displacements)
+        beds = () if tool is None else tool.beds
+        check_hold(self.elements.displacements, [(np.array(bed.normal), bed.sticks) for bed in beds])
         self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
@@ -308,6 +309,8 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
 
 def _with_bars(contact: ContactResult, finer: HierarchicalEstimate) -> ContactResult:
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
+    if contact.rest is not None:
+        found = replace(found, rest=replace(contact.rest, bar=finer.rest_bar))
     if contact.rubbing is None or finer.relative is None:
         return found
     of_slip, of_force = contact.rubbing.bars(contact.area, float(finer.relative[0]), finer.area_bar)

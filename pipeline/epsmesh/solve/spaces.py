@@ -43,9 +43,9 @@ class ElasticSpace:
     """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
-    ``probe_owned`` and ``fixed_owned`` index owned blocks of three dofs. ``owned`` and ``size`` count the dofs of this
-    rank, and of all ranks. ``terms`` are those of the conditions, ``factors`` those of the energy, or None. ``space``
-    and ``dirichlet`` are dolfinx objects.
+    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of a support that lets go, index owned blocks of three
+    dofs. ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the
+    conditions, ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     @stage("spaces, forms")
@@ -63,6 +63,10 @@ class ElasticSpace:
         index_map = space.dofmap.index_map
         self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
+        if conditions.released:
+            fixed, resting = _NO_DOFS, fixed
+        else:
+            resting = _NO_DOFS
         # Candidates for unilateral contact may be on the support: the active set leaves them out.
         if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the fixed face: no displacement satisfies both conditions")
@@ -75,7 +79,8 @@ class ElasticSpace:
         self._probe, self._fixed, self._sides = probe, fixed, self._sides_of(probe)
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
-        self.probe_owned, self.fixed_owned = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed))
+        of_blocks = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed, resting))
+        self.probe_owned, self.fixed_owned, self.resting_owned = of_blocks
         self.forms = ElasticForms(space, body.regions, cell_kernel, self.factors)
         self.terms: list[Term] = [term.on(body, self.forms.displacement) for term in conditions.terms]
 

@@ -8,6 +8,7 @@ terms are forms of UFL, whose derivatives follow: :class:`EnergyTerm`.
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import compress
 from typing import Any, Protocol
 
 import numpy as np
@@ -284,16 +285,19 @@ class DeadLoads:
         """Return None."""
 
 
-def check_hold(space: Any) -> None:
+def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None:
     """Check that terms of an elastic space without support leave no rigid motion of the whole body free; collective.
 
     Planes of symmetry hold no body: a motion that they exclude is free all the same. Between motions of which one is
     its own image in a plane, and the other its opposite, the forces on the whole body do no work.
 
+    Where it rests on ``beds``, each is given by its normal (3), and whether it rubs; planes of symmetry then do hold.
+
     Raises:
         SolveError: if they leave one.
     """
-    if not space.terms or space.comm.allreduce(len(space.fixed_owned)):
+    rests = space.conditions.released
+    if not (space.terms or rests) or space.comm.allreduce(len(space.fixed_owned)):
         return
     places, planes = space.places.reshape(-1, 3), list(space.body.mirrored)
     *centre, count = global_sum(space.comm, np.array([*places.sum(axis=0), len(places)]))
@@ -310,14 +314,34 @@ def check_hold(space: Any) -> None:
     with space.at_rest():
         forces = sum((np.array([product(term, mode) for mode in modes]) for term in space.terms), np.zeros(modes.shape))
     stiffness = global_sum(space.comm, (modes @ forces.T).ravel()).reshape(len(modes), -1)
+    stiffness += _of_beds(space, modes, beds, float(np.trace(stiffness)))
     stiffness *= (images[:, None] == images).all(axis=2)
+    if rests:  # along a bed it slides without work: its place is that of the model
+        kept = images.all(axis=1)
+        motions, stiffness = dict(compress(motions.items(), kept)), stiffness[np.ix_(kept, kept)]
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     if not values[0] > _FREE * abs(values[-1]):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
+        if rests:
+            raise SolveError(
+                f"the body floats: its support lets it {free}, and nothing else prevents that; give [body.support] "
+                "friction, add a term of [load] that prevents it, or place the tool in the planes of symmetry"
+            )
         raise SolveError(
             f"nothing of the body is fixed, and the terms that act on it let it {free}: fix a face, or add a term that "
             "prevents it"
         )
+
+
+def _of_beds(space: Any, modes: FloatArray, beds: Sequence[tuple[FloatArray, bool]], size: float) -> FloatArray:
+    """Return the stiffness (6, 6) of springs of about a ``size`` in place of beds, in rigid ``modes`` (6, n)."""
+    moved = modes.reshape(len(modes), -1, 3)[:, space.resting_owned]
+    found = np.zeros((len(modes), len(modes)))
+    for normal, rubs in beds:
+        held = moved if rubs else (moved @ normal)[:, :, None] * normal
+        found += np.einsum("inc,jnc->ij", held, held)
+    found = global_sum(space.comm, found.ravel()).reshape(found.shape)
+    return np.asarray(found * ((size or 1.0) / (np.trace(found) or 1.0)))
 
 
 def product(term: Term, direction: FloatArray) -> FloatArray:

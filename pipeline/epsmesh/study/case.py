@@ -15,6 +15,7 @@ from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.axis import Axis
 from epsmesh.study.capabilities.features import (
     features_of,
+    has_terms,
     imaged_load,
     is_loaded,
     needs_time_steps,
@@ -235,7 +236,7 @@ class Case:
     def is_plate(self) -> bool:
         """Whether the body has no support below the probe, and is so thin that it bends."""
         thickness = self.body.thickness(self.frame)
-        return not self.body.support.holds_column() and thickness < _PLATE * self.reach
+        return not self.body.hold.holds_column() and thickness < _PLATE * self.reach
 
     @property
     @of_scene
@@ -319,7 +320,7 @@ class Case:
             needs_time_steps(self),
             Dimension.SECTION if probe.crack else Dimension.BODY,
             is_loaded=is_loaded(self),
-            has_terms=bool(self.terms),
+            has_terms=has_terms(self),
             is_inclined=touches_inclined(self),
             motion=self._motion,
         )

@@ -36,9 +36,10 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     for body in bodies:
         with problems.about(body=body):
             _check_capsules(body, problems)
+            _check_rest(body, problems)
     problems.each(lambda body, _: _check_imaged(body, loads, problems), body=bodies)
     for body, load in product(bodies, loads):
-        if body.fixed == NONE and not any(term.HOLDS for term in load.terms):
+        if body.fixed == NONE and body.resting is None and not any(term.HOLDS for term in load.terms):
             with problems.about(body=body):
                 _nothing_holds(problems)
         for name in TERMS:
@@ -68,6 +69,13 @@ def _check_capsules(body: Body, problems: Problems) -> None:
             problems.error(f"body.{place}.capsule.on", None, where)
 
 
+def _check_rest(body: Body, problems: Problems) -> None:
+    """Report a body that is fixed as well as it rests on a support that lets go."""
+    if body.resting is not None and body.fixed != NONE:
+        held = 'must be "none" with [body.support]: the part that rests on it is not fixed, nor is another'
+        problems.error("body.fixed", body.model_dump()["fixed"], held)
+
+
 def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None:
     """Report a body that has its shape under loads of which the study has none."""
     is_all, what = body.is_loaded == "all", "gravity" if body.is_loaded == "gravity" else "load"
@@ -80,7 +88,7 @@ def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None
 def _nothing_holds(problems: Problems) -> None:
     able = " or ".join(f"[[load.{name}]]" for name, kind in TERMS.items() if kind.HOLDS)
     more = f", or add {able}" if able else "; a term that would hold it instead is a file that you add"
-    problems.error("body.fixed", NONE, f"nothing holds the body: fix a face{more}")
+    problems.error("body.fixed", NONE, f"nothing holds the body: fix a face{more}, or let it rest on [body.support]")
 
 
 def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:
@@ -135,10 +143,11 @@ def _check_place(body: Body, on: str | Cap, key: str, problems: Problems) -> boo
     if on != FREE and on not in names:
         problems.error(key, on, f"the {body.shape} has no such face; {nearest(on, [*names, FREE])}")
         return False
-    support = body.support
+    support = body.hold
     held = support.names if isinstance(support, Faces) else (support.face,) if isinstance(support, NamedFace) else ()
     if on in held:
-        problems.error(key, on, "is fixed: what is there acts on the support alone")
+        rests = "is fixed: what" if body.resting is None else "rests on [body.support]: what"
+        problems.error(key, on, f"{rests} is there acts on the support alone")
         return False
     return True
 

@@ -91,7 +91,7 @@ def held_gaps(body: Body, probe: Probe, mesh: Mesh) -> dict[str, float]:
     if isinstance(body, FromFile) or not is_level(body, frame):
         if isfinite(gap := held_gap(body, probe, frame)):
             gaps["body.fixed"] = gap
-    elif (beside := body.support.gap(probe.gap(body, frame))) is not None:
+    elif (beside := body.hold.gap(probe.gap(body, frame))) is not None:
         gaps["body.fixed"] = beside
     if mesh.outside != "free" and isfinite(column := mesh.column(body.reach(frame))):
         gaps["mesh.epsilon"] = column - probe.expected_radius
@@ -164,7 +164,7 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
 
 def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
     """Report a support that elements cannot follow."""
-    body.support.check(body.heights, mesh.fine, problems)
+    body.hold.check(body.heights, mesh.fine, problems)
 
 
 def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:

@@ -65,7 +65,7 @@ def _check_keys(probe: Inserted, problems: Problems) -> None:
 def _check_end(body: Layered, probe: Inserted, insertion: Insertion, problems: Problems) -> None:
     """Report a path through the bottom or the support, and one whose slit leaves the top."""
     low, top = body.heights
-    end = min(top - low, *(top - level for level in body.support.edges()), top - low)
+    end = min(top - low, *(top - level for level in body.hold.edges()), top - low)
     room, words = probe.insertion_room
     if insertion.to + room > end:
         problems.error(

@@ -31,7 +31,7 @@ OTHER_NAMES = {
     **dict.fromkeys(("C2", "c01", "C01", "c20", "C20"), "unknown key; `c2` is C2 / (C1 + C2), or C2 / C1 of yeoh"),
     **dict.fromkeys(("d1", "D1"), _D1),
     **dict.fromkeys(("prony", "tau", "viscoelastic"), _RELAXES),
-    **dict.fromkeys(("support", "supports", "boundary", "bc", "roller", "rollers", "symmetry"), _HELD),
+    **dict.fromkeys(("supports", "boundary", "bc", "roller", "rollers", "symmetry"), _HELD),
     **dict.fromkeys(("indentation", "displacement"), "unknown key; the depth of the tool is `depth`"),
 }
 # Those of single sections.

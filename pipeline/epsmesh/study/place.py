@@ -98,5 +98,5 @@ def _check_contact(body: Body, probe: Probe, frame: Frame) -> None:
 @lru_cache(_MANY)
 def held_gap(body: Body, probe: Probe, frame: Frame) -> float:
     """Return the distance (m) from the footprint to the support."""
-    distance = body.support.distance(body.surfaces(), lifted_edge(body, probe, frame))
+    distance = body.hold.distance(body.surfaces(), lifted_edge(body, probe, frame))
     return inf if distance is None else float(distance.min())

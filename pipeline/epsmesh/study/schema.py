@@ -17,6 +17,7 @@ from epsmesh.shapes.history import History
 from epsmesh.shapes.insertion import Insertion
 from epsmesh.shapes.regions import Inclusion, Layer
 from epsmesh.shapes.registry import BODIES, PROBES, TERMS
+from epsmesh.shapes.resting import Resting
 from epsmesh.shapes.section import Section, Words
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.tissue import LAWS, Fibres, Relaxation, Spread, Term, Tissue
@@ -389,7 +390,7 @@ NESTED: dict[str, dict[str, type[Section]]] = {
 SINGLE = ("solve", "plan", "figure", "credibility")
 # Tables within a section.
 TABLES: dict[str, dict[str, type[BaseModel]]] = {
-    "body": {"capsule": Capsule},
+    "body": {"capsule": Capsule, "support": Resting},
     "probe": {"path": Path, "history": History, "insertion": Insertion},
     "material": {"fibres": Fibres, "spread": Spread, "young": Varying},
 }

@@ -78,7 +78,7 @@ def _check_depth(body: Body, slit: Slit, problems: Problems) -> None:
 
 
 def _check_support(body: Body, slit: Slit, problems: Problems) -> None:
-    support, (_, high) = body.support, body.heights
+    support, (_, high) = body.hold, body.heights
     for level in support.edges():
         if slit.depth >= high - level:
             problems.error(

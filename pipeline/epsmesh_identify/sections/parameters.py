@@ -6,7 +6,8 @@ from functools import partial
 from math import inf, nan
 
 from epsmesh.shapes.body import Body, Layered
-from epsmesh.shapes.probe import MOST_FRICTION, Probe
+from epsmesh.shapes.friction import MOST_FRICTION
+from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.regions import Embedded
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.tissue import Fibres, Term, Tissue, name_in_term

@@ -56,7 +56,7 @@ def layered_body(case: Case) -> LayeredBody | None:
     is_elastic = not (case.way.is_large or any(region.is_large for region in body.regions))
     if not (isinstance(body, Layered) and is_flat and is_on_top and is_elastic and _slides(case.probe)):
         return None
-    if case.load.acts or case.terms or case.is_truncated or case.varies:
+    if case.load.acts or case.way.has_terms or case.is_truncated or case.varies:
         return None
     return LayeredBody(tuple(_layers(case, body)), RIGID)
 

@@ -189,7 +189,7 @@ def _flat_refusal(case: Case, first: Case, body: Layered) -> str:
             f"least {1e3 * least:.3g} mm, a twentieth of the body's width. For thinner layers, make the body narrower "
             f"(at most {1e3 * 2 * body.depth_of_tissue / _SHALLOWEST:.3g} mm wide)"
         )
-    if not isinstance(body.support, Faces) or set(body.support.names) != {"bottom"}:
+    if not isinstance(body.hold, Faces) or set(body.hold.names) != {"bottom"}:
         return 'body.fixed must be "bottom" for a real-time model'
     if not probe.REALTIME:
         known = ", ".join(shape for shape, kind in PROBES.items() if kind.REALTIME)

@@ -108,7 +108,7 @@ def far_surface(
         GeometryError: if nothing, or all, of it is fixed.
         MeshError: if the remesher fails.
     """
-    (below,), (skin,), triangles = body.support.edges(), body.surfaces()["skin"], body.triangles
+    (below,), (skin,), triangles = body.hold.edges(), body.surfaces()["skin"], body.triangles
     largest = body.bend / EDGES_PER_RADIUS / finer
     parts = body.partition or Complex.around(triangles)
 

@@ -84,7 +84,7 @@ def excluded(study: Study, cases: Sequence[Case]) -> list[str]:
         "lifting off": not any(tool.is_unilateral for tool in tools),
         "puncture and cutting": not study.is_insertion,
         "residual stress": not any(case.imaged or "tension of the capsule" in case.features for case in cases),
-        "loads besides the tool": not any(case.load.acts or case.terms for case in cases),
+        "loads besides the tool": not any(case.load.acts or case.way.has_terms for case in cases),
     }
     always = ("flow of fluid in the tissue", "adhesion", "damage short of a cut", "temperature")
     return [*(name for name, is_absent in absent.items() if is_absent), *always]

@@ -1,6 +1,6 @@
 """The constraint of a Newton step at the nodes of a contact."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Constraint:
     the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
     subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions; where they are friction,
     ``sliding`` is how they follow the reactions, for tissue that can solve for both. ``is_there``: held slots are next
-    to where they are held.
+    to where they are held. ``resting`` (n) are the nodes above a bed: None if there is none.
     """
 
     frames: FloatArray
@@ -40,8 +40,25 @@ class Constraint:
     forces: FloatArray
     sliding: Sliding | None = None
     is_there: bool = False
+    resting: BoolArray | None = None
 
     @property
     def is_turned(self) -> bool:
         """Whether frames or turns change the operator."""
         return bool(self.turning.any() or (self.frames != np.eye(self.frames.shape[-1])).any())
+
+    @property
+    def firm(self) -> BoolArray | None:
+        """The nodes (n) above a bed that are held along all axes: where nothing else holds the body, these do."""
+        if self.resting is None:
+            return None
+        return np.asarray(self.resting & self.held.all(axis=1))
+
+    def sticking(self, nodes: BoolArray, moves: FloatArray) -> "Constraint":
+        """Return it with the tangents of ``nodes`` (n) held, too: they go along them by their parts of ``moves``
+        (n, d), m."""
+        held, values = self.held.copy(), self.values.copy()
+        along = np.einsum("nji,nj->ni", self.frames, moves)
+        held[nodes, :-1] = True
+        values[nodes, :-1] = along[nodes, :-1]
+        return replace(self, held=held, values=values)

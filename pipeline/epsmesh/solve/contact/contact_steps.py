@@ -22,8 +22,10 @@ from epsmesh.solve.contact.deformed import (
     solve_contact,
 )
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
+from epsmesh.solve.contact.parts import TOOL
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 
@@ -61,11 +63,12 @@ class ContactPath(Path[ContactPathPoint]):
 class Friction:
     """Coulomb's ``coefficient`` (infinite: it sticks) for a tool that moves along the unit vector ``advance``.
 
+    Where nodes above a bed are among all, both are given for each node: (n), and (n, d), zero on the bed.
     ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path. ``is_linear``: the
     tissue is, and the initial guess of a step is its solution for the contact before.
     """
 
-    coefficient: float
+    coefficient: float | FloatArray
     advance: FloatArray
     penalty: FloatArray
     neighbours: Neighbours
@@ -73,13 +76,22 @@ class Friction:
     is_linear: bool = False
 
     @classmethod
-    def on(cls, body: DeformedBody, coefficient: float, depth: float) -> "Friction":
-        """Return the friction of a tool that advances along −z to a ``depth`` (m) on a ``body``; collective."""
-        candidates = body.candidates
-        width = float(np.median(candidates.widths[candidates.widths > 0]))
-        modulus = float(np.mean(candidates.of_facets(body.law.plane_moduli)))
-        penalty = modulus * width + body.stiffness_of_terms()
-        return cls(coefficient, np.array([0.0, 0.0, -1.0]), penalty, candidates.neighbours, depth)
+    def on(cls, body: DeformedBody, tool: Tool, depth: float) -> "Friction":
+        """Return the friction of a ``tool`` that advances along −z to a ``depth`` (m) on a ``body``; collective."""
+        coefficients, penalties = [tool.friction, *(inf if bed.sticks else 0.0 for bed in tool.beds)], list[float]()
+        parts = [body.part(number) for number in range(len(coefficients))]
+        for part in parts:
+            width = float(np.median(part.candidates.widths[part.candidates.widths > 0]))
+            penalties.append(float(np.mean(part.candidates.of_facets(body.law.plane_moduli))) * width)
+        coefficient: float | FloatArray = tool.friction
+        advance, penalty = np.array([0.0, 0.0, -1.0]), penalties[TOOL] + body.stiffness_of_terms()
+        if tool.beds:
+            coefficient, penalty = np.zeros(len(body.fixed)), body.stiffness_of_terms()
+            for part, own, of_part in zip(parts, coefficients, penalties, strict=True):
+                coefficient[part.nodes] = own
+                penalty[part.nodes] += of_part
+            advance = np.where(parts[TOOL].mask(len(body.fixed))[:, None], advance, 0.0)
+        return cls(coefficient, advance, penalty, body.candidates.neighbours, depth)
 
 
 def reach_contact(
@@ -184,8 +196,8 @@ def reach_contact_with_friction(
         amount = depth * (number / steps) ** 2
         if path.last.touched is None:
             tissue.state = path.last.state
-            nothing = np.zeros(len(tissue.fixed), dtype=bool)
-            if number < steps and not first_set(tissue, tool_at(amount), nothing).any():
+            nothing, tool = np.zeros(len(tissue.fixed), dtype=bool), tool_at(amount)
+            if number < steps and not tool.touches(first_set(tissue, tool, nothing)):
                 path.add(ContactPathPoint(amount, path.last.state))
                 continue
         path.step = inf
@@ -244,7 +256,7 @@ def _step(
     limit: float,
 ) -> ContactSolution:
     tool, last = tool_at(depth), path.last
-    active = np.zeros(len(tissue.fixed), dtype=bool) if last.touched is None else last.touched.active
+    active = tool.start() if last.touched is None else last.touched.active
     tissue.state = path.guess(depth)
     if not tissue.is_sound:
         tissue.state = last.state

@@ -155,7 +155,7 @@ class Simplified:
         """Return the counts after an iteration in which these nodes (n) change."""
         return Simplified(self.entered + moves, self.turned + turns)
 
-    def law(self, friction: float) -> FloatArray:
+    def law(self, friction: float | FloatArray) -> FloatArray:
         """Return the coefficient of friction of each node."""
         return np.where(self.entered >= _CHANGES, 0.0, friction)
 

@@ -9,6 +9,7 @@ is K - Σ λ H with H = ∂n/∂x. An active node whose predicted reaction pulls
 it. This is a semismooth Newton method (M. Hintermüller, K. Ito and K. Kunisch, SIAM J. Optim. 13, 865, 2002).
 
 The loop knows only nodes of a surface: a body in three dimensions and one in the half plane have the same interface.
+Nodes that rest on a bed (:mod:`.bed`) are among them, with the distance of that.
 """
 
 from collections import Counter
@@ -21,6 +22,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
+from epsmesh.solve.contact.bed import Resting
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
@@ -29,6 +31,9 @@ from epsmesh.solve.newton import HALVINGS, LargeError, Moving, Newton, advance, 
 
 # Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
 SLACK = 1e-6
+# The same for penetration of nodes that stick where they touch: one that leaves carries forces along the bed, too, and
+# sets of nodes that hardly press would follow each other forever.
+_STICKING = 1e-3
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
@@ -93,12 +98,28 @@ class PlacedTool:
 
     Reactions of the ``followers`` (n) mean nothing, as those of corners in degree 2. ``complete`` returns an active set
     that nodes may have: without those of the support, and with followers only where all their neighbours are active.
+    ``resting`` are those that other surfaces than the tool's may touch, None if there are none.
     """
 
     distance: Callable[[FloatArray], Distance]
     complete: Callable[[BoolArray], BoolArray]
     followers: BoolArray
     depth: float
+    resting: Resting | None = None
+
+    def touches(self, active: BoolArray) -> bool:
+        """Return whether the tool touches one of the ``active`` nodes (n)."""
+        return bool((active if self.resting is None else active & ~self.resting.nodes).any())
+
+    @property
+    def slack(self) -> float | FloatArray:
+        """The penetration (m) that is solver error, of all or of each node (n)."""
+        least = SLACK * self.depth
+        return least if self.resting is None else np.where(self.resting.stick, _STICKING * self.depth, least)
+
+    def start(self) -> BoolArray:
+        """Return the nodes (n) that touch at the start of a path."""
+        return np.zeros(len(self.followers), dtype=bool) if self.resting is None else self.resting.begin
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +165,7 @@ class Residual(NamedTuple):
 
 def first_set(tissue: Tissue, tool: PlacedTool, active: BoolArray) -> BoolArray:
     """Return an initial active set: ``active`` nodes and all that the tool penetrates; collective."""
-    through = tool.distance(tissue.positions()).gap < -SLACK * tool.depth
+    through = tool.distance(tissue.positions()).gap < -tool.slack
     return tool.complete(active | through)
 
 
@@ -225,7 +246,7 @@ class _InContact(Newton[ContactSolution]):
         pressing = before & active if is_rough else before
         self._pressed = np.where(pressing, along, 0.0)
         exerted = self._exerted(iteration, forces, before)
-        if is_same and self._scale is None and not active.any():
+        if is_same and self._scale is None and not tool.touches(active):
             raise NoTouchError("the probe does not touch a single node: use smaller elements below it")
         residual = Residual(tissue.unbalanced(), float(np.linalg.norm(forces - exerted)))
         enough = max(self._limit, _ROUNDING) if residual.size > self._before / 2 else self._limit
@@ -248,9 +269,14 @@ class _InContact(Newton[ContactSolution]):
         """
         active, normal = self._active, self._there.normal
         constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
+        resting = self._tool.resting
+        if resting is not None:
+            constraint = replace(constraint, resting=resting.nodes)
         constraint = replace(constraint, is_there=self._is_closed)
         if self._friction is not None:
             constraint = self._friction.constrain(constraint, self._there, active)
+        elif resting is not None:
+            constraint = constraint.sticking(resting.stick & active, resting.anchors - self._there.positions)
         self._predicted = np.where(self._tissue.fixed, 0.0, self._tissue.linearise(constraint))
         self._reactions = np.einsum("ni,ni->n", self._predicted, normal)
         if advance(self._tissue, HALVINGS, self._descent()) < _WHOLE and iteration == 0 and not self._is_patient:
@@ -312,6 +338,8 @@ class _InContact(Newton[ContactSolution]):
         """Return the forces (n, d) of the tool on nodes of the set ``before``; the state of friction follows."""
         exerted = self._pressed[:, None] * self._there.normal
         if self._friction is None:
+            if (resting := self._tool.resting) is not None:
+                exerted = np.where((resting.stick & before)[:, None], forces, exerted)
             return exerted
         if iteration:
             self._friction.update(iteration, self._there, self._predicted, before, self._active)
@@ -330,8 +358,13 @@ class _InContact(Newton[ContactSolution]):
 
     @property
     def _open(self) -> float:
-        """The largest gap (m) of active nodes."""
-        return float(np.abs(self._place.gap[self._active]).max(initial=0.0))
+        """The largest gap (m) of active nodes, and the largest slip of those that are held where they stick."""
+        found, resting = float(np.abs(self._place.gap[self._active]).max(initial=0.0)), self._tool.resting
+        if resting is not None and self._friction is None:
+            held = self._active & resting.stick
+            slips = self._there.slips(resting.anchors)[held]
+            found = max(found, float(np.linalg.norm(slips, axis=1).max(initial=0.0)))
+        return found
 
     @property
     def _is_closed(self) -> bool:
@@ -377,7 +410,7 @@ def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active
 def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: FloatArray) -> BoolArray:
     """Return active nodes under pressure, and inactive nodes that penetrate the tool."""
     pull = -SLACK * float(np.abs(reactions[active]).mean()) if active.any() else 0.0
-    following = np.where(active, reactions > pull, gap < -SLACK * tool.depth)
+    following = np.where(active, reactions > pull, gap < -tool.slack)
     return tool.complete(following)
 
 

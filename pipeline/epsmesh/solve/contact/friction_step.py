@@ -23,7 +23,8 @@ _NO_PART = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FrictionStep:
-    """Friction between n nodes and a tool at one depth: its coefficient ``friction``, infinite for tissue that sticks.
+    """Friction between n nodes and what they touch at one depth: the coefficient ``friction``, infinite for tissue
+    that sticks, of all or of each (n).
 
     ``references`` (n, d) are places on the tool at this depth (m); ``penalty`` (n) is the parameter c (N/m). ``slide``
     and ``normal`` (n, N) are the state and the normal reactions at the equilibrium before. ``fixed`` (n, d) are the
@@ -31,7 +32,7 @@ class FrictionStep:
     settle. ``is_linear``: the tissue is, and solves for friction and reactions together.
     """
 
-    friction: float
+    friction: float | FloatArray
     references: FloatArray
     penalty: FloatArray
     neighbours: Neighbours
@@ -82,7 +83,7 @@ class FrictionIteration:
         simple = active & self._simple.nodes & ~self._with.neighbours.is_corner
         pressed = np.abs(self.normal)
         share = float(pressed[simple].sum()) / float(pressed[active].sum())
-        return share <= self._with.simplified or self._with.friction * share <= _NO_PART
+        return share <= self._with.simplified or float(np.max(self._with.friction)) * share <= _NO_PART
 
     def _friction(self, place: "Placed", slide: Slide) -> FloatArray:
         """Return the friction (n, d) N on nodes that ``slide``, zero on others.
@@ -91,8 +92,8 @@ class FrictionIteration:
         """
         law = self._simple.law(self._with.friction)
         most = largest_friction(law, self.normal)
-        if self._with.friction < np.inf:
-            most = np.where(self._with.neighbours.is_corner, law * self.normal, most)
+        limited = np.less(self._with.friction, np.inf)
+        most = np.where(limited & self._with.neighbours.is_corner, np.where(limited, law, 0.0) * self.normal, most)
         most = np.where(slide.sliding & (most < np.inf), most, 0.0)
         return np.where(self._with.fixed, 0.0, most[:, None] * _within(place, slide).directions)
 

@@ -22,8 +22,9 @@ from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.contact_steps import ContactPathPoint, Friction, check_outside, friction_step
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, SteppedTissue, first_set, solve_contact
 from epsmesh.solve.contact.friction_step import Placed
-from epsmesh.solve.contact.large import on_surface, placed_tool
+from epsmesh.solve.contact.large import on_surface
 from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.sagged import sagged_body
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -160,7 +161,7 @@ class ToolIndentation(ContactIndentation):
         self._tool, self._is_loaded = sagged.placed(tool, tissue), not isnan(sagged.sag)
         self.sag, self.load_energy = sagged.sag, sagged.stored
         self._elastic_before = tissue.elastic_forces()
-        friction = Friction.on(tissue, tool.friction, depth) if tool.friction else None
+        friction = Friction.on(tissue, tool, depth) if tool.friction else None
         super().__init__(tissue, tissue.positions(), 1.0, depth, friction)
         self._scale = 0.0 if applied is None else _OF_LOADS * applied.size
 

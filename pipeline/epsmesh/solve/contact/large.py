@@ -20,7 +20,7 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh import fitted
-from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
@@ -37,6 +37,8 @@ from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
 from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.placed import placed_tool
+from epsmesh.solve.contact.rest import Rest, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -122,7 +124,7 @@ class LargeContact:
     def _with_friction(self, smooth: "LargeContactSolution") -> "tuple[LargeContactSolution, int]":
         """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
         body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
-        friction = Friction.on(body, self._tool.friction, depth)
+        friction = Friction.on(body, self._tool, depth)
         found, iterations = list[ContactSolution](), 0
         for steps in (self.STEPS // 2, self.STEPS):
             path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
@@ -142,18 +144,8 @@ class LargeContact:
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
     """Return the error of a ``path`` that ends before ``depth`` (m)."""
     last, whole = path.last, 2.0 ** len(body.elements.body.mirrored)
-    reached = last.amount, 0.0 if last.touched is None else whole * force_of(last.touched)
-    return ended(why, body.law, reached, depth, is_found=True, friction=friction)
-
-
-def placed_tool(body: DeformedBody, tool: Tool, depth: float) -> PlacedTool:
-    """Return the tool at a ``depth`` (m) above the candidates of a body."""
-    neighbours, on_support = body.candidates.neighbours, body.fixed.all(axis=1)
-
-    def complete(active: BoolArray) -> BoolArray:
-        return neighbours.complete(active) & ~on_support
-
-    return PlacedTool(lambda points: tool.distance(points, depth), complete, neighbours.followers, depth)
+    force = 0.0 if last.touched is None else whole * force_of(body.part().solution(last.touched))
+    return ended(why, body.law, (last.amount, force), depth, is_found=True, friction=friction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +194,11 @@ class LargeContactSolution:
         """The force (N) on the modelled part of the tool, along its axis."""
         return self.surface_contact.force
 
+    @cached_property
+    def rests(self) -> tuple[Rest, ...]:
+        """What the beds do to the modelled part."""
+        return rests_of(self.body, self.tool.beds, self.touched)
+
     def equilibrium(self, movement: Movement, iterations: int, stack: ExitStack) -> Equilibrium:
         """Return the checked equilibrium of a ``movement``; the ``stack`` frees its columns."""
         columns, elements, body = self.body.elements.columns(movement, stack), self.body.elements, self.body
@@ -214,7 +211,8 @@ class LargeContactSolution:
     def summary(self) -> ContactResult:
         """Return the whole contact, with the effects of loads."""
         stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
-        return self.surface_contact.result(self.sagged.sag, stored)
+        found = self.surface_contact.result(self.sagged.sag, stored)
+        return replace(found, rest=self.rests[0].result()) if self.rests else found
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -224,7 +222,8 @@ class LargeContactSolution:
             ContactError: if contact reaches the support or the edge of the candidates.
         """
         check_support(self.body, self.touched)
-        check_edge(self.tool, self.body.candidates, self.touched.active)
+        tool = self.body.part()
+        check_edge(self.tool, tool.candidates, tool.of(self.touched.active))
         check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:
@@ -232,10 +231,11 @@ class LargeContactSolution:
         space = self.body.elements.displacements
         local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
         support = float(global_sum(space.comm, np.array([local]))[0])
+        support += sum(float(bed.force[2]) for bed in self.rests)
         support -= float(self.body.on_terms[2])
         balance = abs(support / self.force - 1)
         check_balance(balance)
-        on_probe = self.touched.forces.sum(axis=0)[None] / self.depth
+        on_probe = self.surface_contact.touched.forces.sum(axis=0)[None] / self.depth
         return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)
 
     def hierarchical_estimate(
@@ -255,13 +255,18 @@ class LargeContactSolution:
             self.body.state = state
             return half_the_steps(found, self.surface_contact, smooth.force)
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
-        share, at_edge = 1 - finer.force / self.force, here.area.bar
+        # The edge at which the body lifts off a bed is found, too.
+        share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])
         least = fitted.AT_EDGE_LARGE[self.body.elements.degree]
         decrement, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
-        return estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
+        found = estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
+        if not self.rests:
+            return found
+        (rest, *_), (again, *_) = self.rests, finer.rests
+        return replace(found, rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1))
 
     def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
         """Return the rate with the same nodes in contact."""
@@ -331,10 +336,11 @@ class LargeContactSolution:
         """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
         if not self.tool.is_sharp:
             return 0.0
-        candidates, edge = self.body.candidates, np.flatnonzero(self.body.candidates.is_edge)
+        candidates, touched = self.surface_contact.candidates, self.surface_contact.touched
+        edge = np.flatnonzero(candidates.is_edge)
         at_end = np.zeros(len(candidates), dtype=bool)
         at_end[edge] = self.tool.ends_at(candidates.points[edge])
-        touching = self.touched.active[candidates.facets].any(axis=1)
+        touching = touched.active[candidates.facets].any(axis=1)
         areas = candidates.areas * touching
         return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
 
@@ -343,8 +349,10 @@ def on_surface(
     body: DeformedBody, tool: Tool, touched: ContactSolution, coarse: ContactSolution | None = None
 ) -> SurfaceContact:
     """Return contact with a body, where its candidates are; ``coarse`` is that from half as many load steps."""
-    candidates = body.candidates
+    part = body.part()
+    candidates = part.candidates
     if not body.law.is_linear:
-        candidates = replace(candidates, points=body.positions())
-    modulus = candidates.from_regions(body.law.plane_moduli)
-    return SurfaceContact(candidates, touched, tool, modulus, body.elements.body.mirrored, coarse)
+        candidates = replace(candidates, points=part.of(body.positions()))
+    modulus, mirrored = candidates.from_regions(body.law.plane_moduli), body.elements.body.mirrored
+    coarse = None if coarse is None else part.solution(coarse)
+    return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse)

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
 from epsmesh.solve.contact.surface import Candidates, find_candidates
@@ -37,7 +38,8 @@ class Surface:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
             space = self.space(degree)
-            self._found[degree] = find_candidates(self.spaces.body, space.space, space.means)
+            groups = (PROBE, FIXED) if self._conditions.released else (PROBE,)
+            self._found[degree] = find_candidates(self.spaces.body, space.space, space.means, groups)
         return self._found[degree]
 
     def space(self, degree: int) -> ElasticSpace:
@@ -73,6 +75,11 @@ class Numbering:
         """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
         here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
         return np.sort(3 * self.local[here] + 2).astype(np.int32)
+
+    def all_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
+        """Return the local dofs of the ``chosen`` (n) along all axes."""
+        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
+        return np.sort((3 * self.local[here][:, None] + np.arange(3)).ravel()).astype(np.int32)
 
     def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
         """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
@@ -134,14 +141,22 @@ class Hierarchy:
         """Positions of the candidates in the finest space."""
         return self._numberings[-1]
 
-    def hold(self, active: BoolArray) -> list[Level]:
-        """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective."""
+    def hold(self, active: BoolArray, firm: BoolArray | None = None) -> list[Level]:
+        """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective.
+
+        Those that are ``firm`` (n), too, are fixed along all axes.
+        """
+        dofs = [numbering.normal_dofs(chosen) for numbering, chosen in self._on_levels(active)]
+        if firm is not None:
+            whole = (numbering.all_dofs(chosen) for numbering, chosen in self._on_levels(firm))
+            dofs = [np.union1d(*both).astype(np.int32) for both in zip(dofs, whole, strict=True)]
+        return [operator.hold(own) for operator, own in zip(self._operators, dofs, strict=True)]
+
+    def _on_levels(self, chosen: BoolArray) -> list[tuple[Numbering, BoolArray]]:
+        """Return the numbering of each level, and which of its candidates are ``chosen`` (n), by majority."""
         *coarser, finest = self._candidates
-        sets = [*(finest.lowered(active, lower) for lower in coarser), active]
-        return [
-            operator.hold(numbering.normal_dofs(chosen))
-            for operator, numbering, chosen in zip(self._operators, self._numberings, sets, strict=True)
-        ]
+        sets = [*(finest.lowered(chosen, lower) for lower in coarser), chosen]
+        return list(zip(self._numberings, sets, strict=True))
 
     def hold_facets(self, facets: Int32Array) -> list[Level]:
         """Return the levels with all of the local ``facets`` fixed, valid until the next call; collective."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.geometry import Touch
+from epsmesh.solve.contact.settle import settle
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.dead_loads import sag
@@ -26,7 +27,8 @@ class Sagged:
     """The ``state`` (owned dofs) of a body before the tool touches it, and its ``energy`` (J).
 
     ``sag`` (m) is how much farther the tool moves to the first touch, ``stored`` (J) the strain energy; both NaN
-    without loads. Energies are those of the modelled part.
+    without loads. Energies are those of the modelled part. ``begins`` (n) are the nodes that then rest on a bed, None
+    for all.
     """
 
     state: FloatArray
@@ -34,6 +36,7 @@ class Sagged:
     energy: float = 0.0
     stored: float = np.nan
     sag: float = np.nan
+    begins: BoolArray | None = None
 
     def placed(self, tool: Tool, body: DeformedBody) -> Tool:
         """Return a tool whose depths count from the first touch of the sagged surface of a ``body``.
@@ -41,10 +44,10 @@ class Sagged:
         With a linear law its gaps are those above the body at rest.
         """
         if body.law.is_linear:
-            tool = tool.at_rest(body.candidates.points)
+            tool = tool.at_rest(body.part().candidates.points)
         if np.isnan(self.sag):
             return tool
-        return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag))
+        return replace(tool, distance=lambda points, depth: tool.distance(points, depth + self.sag), begins=self.begins)
 
 
 def sagged_body(
@@ -59,7 +62,11 @@ def sagged_body(
     """
     if loads is None and not body.elements.displacements.is_loaded:
         return Sagged(np.zeros(body.elements.unknowns))
-    body.state = sag(body.elements, body.law, loads, guess, has_crept=has_crept)
+    begins = None
+    if tool.beds:
+        begins = settle(body, tool, guess).active
+    else:
+        body.state = sag(body.elements, body.law, loads, guess, has_crept=has_crept)
     if has_crept:
         body.hyperelastic.impose(crept(body.hyperelastic.points, body.law))
     energy = body.energy
@@ -69,17 +76,19 @@ def sagged_body(
         energy,
         energy + body.work_of_loads,
         _sag_of(tool, body),
+        begins,
     )
 
 
 def _sag_of(tool: Tool, body: DeformedBody) -> float:
     """Return how much farther (m) a tool moves to touch a ``body`` in its state, with the gaps of the law."""
-    touch, positions = Touch(tool.height, tool.first), body.positions()
+    touch, part = Touch(tool.height, tool.first), body.part()
+    positions = part.of(body.positions())
     if not body.law.is_linear:
-        return touch.sag_at(body.candidates, positions)
+        return touch.sag_at(part.candidates, positions)
     if tool.normal is not None:
         return _sag_along(tool, np.array(tool.normal), body)
-    return touch.sag(body.candidates, (positions - body.places)[:, 2])
+    return touch.sag(part.candidates, (positions - part.of(body.places))[:, 2])
 
 
 def _sag_along(tool: Tool, normal: FloatArray, body: DeformedBody) -> float:
@@ -88,7 +97,8 @@ def _sag_along(tool: Tool, normal: FloatArray, body: DeformedBody) -> float:
     Raises:
         SolveError: if no depth is found.
     """
-    candidates, moved = body.candidates, (body.positions() - body.places) @ normal
+    part = body.part()
+    candidates, moved = part.candidates, part.of(body.positions() - body.places) @ normal
 
     def gap(depth: float, risen: FloatArray) -> float:
         return Touch(lambda points: tool.heights_along(normal, points, depth)).least(candidates, risen)

@@ -78,7 +78,8 @@ class ContactSearch:
                 the probe does not end.
         """
         is_bent = asked.movement.loads is not None and self._tool.friction > 0
-        if not asked.law.is_linear or self._elements.displacements.terms or is_bent or self._tool.normal is not None:
+        is_large = not asked.law.is_linear or self._tool.normal is not None or self._tool.beds
+        if is_large or self._elements.displacements.terms or is_bent:
             return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)

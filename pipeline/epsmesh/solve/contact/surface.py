@@ -1,10 +1,12 @@
-"""Candidate nodes: the part of a body's surface that a probe may touch, its facets and nodes, equal on every rank.
+"""Candidate nodes: the part of a body's surface that may be touched, its facets and nodes, equal on every rank.
+
+What may touch it is the tool, and the surface that the body rests on, if that lets go: each has facets of its own.
 
 The active set is decided for all ranks at once. Candidates are a few thousand at most, and each rank stores them all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -150,7 +152,8 @@ class Candidates:
     study gives. ``facets`` (m, k) index the nodes, in the order of ``shape``; candidates of all degrees on a mesh have
     the same facets. ``is_edge`` (n) marks nodes on the boundary of the candidates, planes of symmetry aside.
     ``regions`` (m) are those of the tissue below the facets, ``factors`` (m) those of its energy. Only
-    ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others.
+    ``local_facets`` (m) differ by rank: the facets' numbers there, −1 for facets of others. ``contacts`` (m) are the
+    numbers of what may touch the facets, 0 of the tool; None if that is the tool alone.
     """
 
     numbers: IntArray
@@ -161,6 +164,7 @@ class Candidates:
     regions: IntArray
     factors: FloatArray
     local_facets: Int32Array
+    contacts: IntArray | None = None
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -258,27 +262,35 @@ def size_of(forces: FloatArray, facets: IntArray, areas: FloatArray) -> float:
     return float(np.linalg.norm(np.einsum("mk,mkd->md", shares, forces[facets]), axis=1).sum())
 
 
-def find_candidates(body: BodyMesh, space: Any, factors: FloatArray | None = None) -> Candidates:
-    """Return the nodes of ``space`` on the footprint of ``body``; ``factors`` are those of local cells; collective."""
+def find_candidates(
+    body: BodyMesh, space: Any, factors: FloatArray | None = None, groups: Sequence[str] = (PROBE,)
+) -> Candidates:
+    """Return the nodes of ``space`` on ``groups`` of facets of ``body``, one for each contact; collective.
+
+    ``factors`` are those of local cells.
+    """
     topology, tdim = body.mesh.topology, body.mesh.topology.dim
-    facets = body.facets[PROBE]
+    facets = np.concatenate([body.facets[group] for group in groups])
+    contact = np.repeat(np.arange(len(groups)), [len(body.facets[group]) for group in groups])
     topology.create_connectivity(tdim, tdim - 1)
     topology.create_connectivity(tdim - 1, tdim)
     of_facet, of_cell = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
     cell = of_facet.array[of_facet.offsets[facets]]
-    facets, cell = facets[cell < body.owned_cells], cell[cell < body.owned_cells]
+    here = cell < body.owned_cells
+    facets, contact, cell = facets[here], contact[here], cell[here]
     side = np.argmax(of_cell.array.reshape(-1, tdim + 1)[cell] == facets[:, None], axis=1)
     shape = facet_nodes(compat.degree(space))
     dofs = np.take_along_axis(compat.cell_dofs(space)[cell], shape.places[side], axis=1)
     x = shown_places(body, space)[dofs]
     regions = np.zeros(len(cell), dtype=np.int64) if body.regions is None else body.regions[cell]
     own = np.ones(len(cell)) if factors is None else factors[cell]
-    of_all = (np.concatenate(body.comm.allgather(part)) for part in (_global(space, dofs), x, regions, own))
-    numbers, points, regions, own = of_all
+    parts = _global(space, dofs), x, regions, own, contact
+    numbers, points, regions, own, contact = (np.concatenate(body.comm.allgather(part)) for part in parts)
     local = np.full(len(numbers), -1, dtype=np.int32)
     first = body.mesh.comm.scan(len(facets)) - len(facets)
     local[first : first + len(facets)] = facets
-    return _assembled(body, numbers, points, shape, (regions, own), local)
+    found = _assembled(body, numbers, points, shape, (regions, own), local)
+    return found if len(groups) == 1 else replace(found, contacts=contact)
 
 
 def _assembled(

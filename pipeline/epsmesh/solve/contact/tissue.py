@@ -12,6 +12,7 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.deformed import LEFT
 from epsmesh.solve.contact.levels import Numbering, Surface
+from epsmesh.solve.contact.parts import TOOL, Part, part_of
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from epsmesh.solve.elements.base import Elements
@@ -49,6 +50,7 @@ class DeformedBody:
         """
         self.elements, self.law, self.method = elements, law, method
         self.candidates: Candidates = surface.of(elements.degree)
+        self._parts: dict[int, Part] = {}
         space = self._space = elements.displacements
         self.hyperelastic = self._body = HyperelasticBody(elements, law, prestressed=prestressed)
         stack.callback(self._body.close)
@@ -152,6 +154,12 @@ class DeformedBody:
             self._energy = self._body.energy(self._now)
         return self._energy
 
+    def part(self, number: int = TOOL) -> Part:
+        """Return the candidates of the contact with this ``number``, 0 of the tool."""
+        if number not in self._parts:
+            self._parts[number] = part_of(self.candidates, number)
+        return self._parts[number]
+
     @property
     def places(self) -> FloatArray:
         """The nodes' places (n, 3) at rest, in m."""
@@ -172,6 +180,11 @@ class DeformedBody:
     def on_terms(self) -> FloatArray:
         """The resultant (3), N, of all terms besides the law; collective."""
         return self._body.on_terms(self._now)[0]
+
+    @property
+    def size_on_terms(self) -> float:
+        """The sum (N) of the sizes of their nodal forces; collective."""
+        return self._body.on_terms(self._now)[1]
 
     def stiffness_of_terms(self) -> FloatArray:
         """Return the largest stiffness (n), N/m, that all terms besides the law give each node alone; collective."""

@@ -9,6 +9,7 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance, heights_along
 from epsmesh.shapes.frame import Vector
+from epsmesh.solve.contact.bed import Bed
 
 # Depths of which gaps are kept: friction goes from one to the next, and asks for both.
 _DEPTHS = 4
@@ -29,7 +30,9 @@ class Tool:
     axis. ``friction`` is Coulomb's coefficient, infinite for tissue that sticks. ``distance`` is that of
     points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
     ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
-    ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis.
+    ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis. ``beds`` are
+    the surfaces that the body rests on, ``begins`` (n) the nodes of all that touch before the tool does; None for all
+    above beds.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -40,6 +43,8 @@ class Tool:
     foot: tuple[float, float] = (0.0, 0.0)
     is_sharp: bool = False
     normal: Vector | None = None
+    beds: tuple[Bed, ...] = ()
+    begins: BoolArray | None = None
 
     def at_rest(self, places: FloatArray) -> "Tool":
         """Return the tool of linear elasticity: gaps of nodes are those above their undeformed ``places``.

@@ -27,6 +27,8 @@ from epsmesh.solve.newton import FINE, forcing
 from epsmesh.solve.physics import MaterialLaw
 
 _MOST_ITERATIONS = 300
+# Tolerance of linear solves where nodes rest on a bed.
+_ON_BED = 1e-8
 
 
 class TurnedTangent(ABC):
@@ -159,7 +161,7 @@ class IteratedTangent(TurnedTangent):
         elastic = elements.elastic(law)
         self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
         self._solver: Solver | None = None
-        self._active = np.zeros(len(numbering.local), dtype=bool)
+        self._sets = np.zeros(len(numbering.local), dtype=bool)  # of the preconditioner
         self._before = 0.0  # norm of the last right-hand side
         stack.callback(self._close)
         self._work = [stack.enter_context(body.state()) for _ in range(2)]
@@ -212,6 +214,9 @@ class IteratedTangent(TurnedTangent):
         if constraint.sliding is not None:
             # Friction is corrected once an iteration, and then gains little: its nodes would be judged by rough solves.
             tolerance = FINE
+        if constraint.resting is not None:
+            # Far from the tool, nodes on a bed carry little, and rough solves would judge them.
+            tolerance = min(tolerance, _ON_BED)
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
             how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
@@ -227,12 +232,15 @@ class IteratedTangent(TurnedTangent):
 
     def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
         """Return the preconditioner of linear elasticity with the same nodes held along z."""
-        active = constraint.held[:, -1]
-        if self._solver is None or not np.array_equal(active, self._active):
+        active, firm = constraint.held[:, -1], constraint.firm
+        sets = active if firm is None else np.append(active, firm)
+        if self._solver is None or not np.array_equal(sets, self._sets):
             held = self._numbering.normal_dofs(active, owned=True)
-            levels = self._hierarchy.hold(active)
+            if firm is not None:
+                held = np.union1d(held, self._numbering.all_dofs(firm, owned=True)).astype(np.int32)
+            levels = self._hierarchy.hold(active, firm)
             self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
-            self._active = active
+            self._sets = sets
         if isinstance(self._solver, MixedSolver):
             elements = self._solver.elements
             return self._solver.saddle.preconditioner(elements.compliance(self._law), stack)

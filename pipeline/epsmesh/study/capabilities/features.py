@@ -161,6 +161,12 @@ def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
     return (*scene.load.terms, *scene.body.capsules.values())
 
 
+def has_terms(scene: Scene) -> bool:
+    """Return whether anything acts on the body besides its law, the tool and dead loads: terms, or a support that lets
+    go."""
+    return bool(terms_of(scene)) or scene.body.resting is not None
+
+
 def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_: True, **how: Any) -> Feature:
     """Return the feature that a capsule, of the body or a region of it, has by its ``key``."""
 
@@ -173,7 +179,7 @@ def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_:
 
 def _moves_surface(scene: Scene) -> bool:
     """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
-    return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or bool(terms_of(scene)))
+    return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or has_terms(scene))
 
 
 def _has_term(scene: Scene, name: str) -> bool:
@@ -195,7 +201,7 @@ def needs_time_steps(scene: Scene) -> bool:
     if scene.probe.history is None:
         return False
     is_followed = scene.probe.friction > 0 or (scene.probe.is_unilateral and is_loaded(scene))
-    return _is_large(scene) or len(_relaxations(scene)) > 1 or bool(terms_of(scene)) or is_followed
+    return _is_large(scene) or len(_relaxations(scene)) > 1 or has_terms(scene) or is_followed
 
 
 def _is_off_axis(scene: Scene) -> bool:
@@ -268,8 +274,8 @@ FEATURES: dict[str, Feature] = {
     "curved or inclined surface": Feature("probe.axis", lambda s: not _is_flat(s), ("body",)),
     "no flat top": Feature("body.shape", lambda s: not (isinstance(s.body, Layered) and _is_level(s)), ("probe",)),
     "surface or image": Feature("body.shape", lambda s: isinstance(s.body, FromFile) and not s.body.HAS_NAMES),
-    "fixed sides": Feature("body.fixed", lambda s: s.body.support.gap(0.0) == 0.0),
-    "only sides fixed": Feature("body.fixed", lambda s: not s.body.support.holds_column()),
+    "fixed sides": Feature("body.fixed", lambda s: s.body.hold.gap(0.0) == 0.0),
+    "only sides fixed": Feature("body.fixed", lambda s: not s.body.hold.holds_column()),
     "free column": Feature("mesh.outside", lambda s: s.mesh.outside == "free" and isfinite(s.mesh.epsilon)),
     "column": Feature("mesh.outside", _is_column, PLACE),
     "fixed column": Feature("mesh.outside", lambda s: s.mesh.outside == "fixed" and _is_column(s), PLACE),
@@ -284,9 +290,14 @@ FEATURES: dict[str, Feature] = {
     "loads": Feature("load", is_loaded, ("body",)),
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
-    "terms": Feature("load", lambda s: bool(terms_of(s)), ("body",)),
+    "terms": Feature("load", has_terms, ("body",)),
+    "support that lets go": Feature("body.support", lambda s: s.body.resting is not None),
+    "prescribed footprint on a support that lets go": Feature(
+        "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)
+    ),
     "terms of loads": Feature("load", lambda s: bool(s.load.terms)),
     "capsule": _of_capsule(),
+    "capsule on the surface": _of_capsule("", lambda one, body: one in body.skins),
     "capsule that bears compression": _of_capsule(
         ".tension_only", lambda one, _: not one.tension_only, write=lambda _: False
     ),
@@ -294,7 +305,6 @@ FEATURES: dict[str, Feature] = {
         ".tension_only", lambda one, body: one.tension_only and one in body.skins, write=lambda _: True
     ),
     "capsule that wrinkles": _of_capsule(".tension_only", lambda one, _: one.tension_only, write=lambda _: True),
-    "capsule on the surface": _of_capsule("", lambda one, body: one in body.skins),
     "capsule of a hollow region": _of_capsule("", lambda one, body: one.on in body.cavities),
     "tension of the capsule": _of_capsule("", lambda one, _: one.tension > 0),
     **{name: Feature(f"load.{name}", partial(_has_term, name=name), write=lambda _: None) for name in TERMS},

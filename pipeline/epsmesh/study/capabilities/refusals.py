@@ -38,7 +38,8 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
-_WITH_TERMS, _NO_TERMS = "with springs or other terms in [load], or a capsule", "omit them"
+_WITH_TERMS = "with springs or other terms in [load], a capsule, or a support that lets go"
+_NO_TERMS = "omit them"
 _TERMS: dict[str, type[BodyTerm]] = {**TERMS, "capsule": Capsule}
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
 _OF_LAW = "with a law of large displacements"
@@ -53,6 +54,8 @@ _NO_DERIVATIVES = {
     "history": "is not computed over time: omit [probe.history], or it",
     "given force": "is computed at given depths: give a depth, or omit it",
 }
+
+_LIFTS = "is not computed where tissue may lift off its support: omit it, or [body.support]"
 
 REFUSALS: tuple[Refusal, ...] = (
     # What the shapes have no keys for: the schema refuses it.
@@ -240,7 +243,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("slit", "terms", f"a slit {_WITH_TERMS} is not computed: {_NO_TERMS}"),
     Refusal("slice", "terms", f"must be 0 mm {_WITH_TERMS}: the blade only presses"),
     Refusal("insertion", "terms", f"cuts in tissue {_WITH_TERMS} are not computed: {_NO_TERMS}"),
-    Refusal("half ball", "terms", f"the far field has neither those of [load] nor a capsule: {_COARSE}"),
+    Refusal("half ball", "terms", f"the far field has none of those of [load], capsule and support: {_COARSE}"),
     Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
     Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
     Refusal(
@@ -253,6 +256,24 @@ REFUSALS: tuple[Refusal, ...] = (
         "capsule that wrinkles under the tool",
         'does not settle on a capsule that wrinkles under it: omit it, or use friction = "stick"',
     ),
+    # A support that lets go: its contact is found with that of the tool.
+    Refusal(
+        "prescribed footprint on a support that lets go",
+        "support that lets go",
+        'must be "unilateral" on a support that lets go: the contacts of tool and support are found together',
+    ),
+    Refusal(
+        "support that lets go",
+        "accuracy",
+        "has an edge where tissue lifts off, which meshes for an accuracy do not refine: give sizes",
+    ),
+    Refusal(
+        "capsule on the surface",
+        "support that lets go",
+        "ends where a support begins, and tissue that lifts off would lie bare: omit it, or [body.support]",
+    ),
+    Refusal("support that lets go", "time steps", f"{_IN_STEPS}, in which tissue lifts off no support: {_STATIC}"),
+    *(Refusal(name, "support that lets go", _LIFTS) for name in ("influence", "spread")),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )

@@ -1,0 +1,55 @@
+"""All that touches a body at one depth of the tool: the tool, and the beds that the body rests on."""
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.shapes.distance import Distance
+from epsmesh.solve.contact.bed import Resting
+from epsmesh.solve.contact.deformed import PlacedTool
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.tool import Tool
+
+
+def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
+    """Return the tool at a ``depth`` (m), and the beds of the body, above the candidates of a body.
+
+    With ``away`` the tool is as far off (m), and touches nothing.
+    """
+    neighbours, on_support = body.candidates.neighbours, body.fixed.all(axis=1)
+
+    def complete(active: BoolArray) -> BoolArray:
+        return neighbours.complete(active) & ~on_support
+
+    def of_tool(points: FloatArray) -> Distance:
+        if away is None:
+            return tool.distance(points, depth)
+        flat = np.zeros((*points.shape, points.shape[1]))
+        return Distance(np.full(len(points), away), np.tile([0.0, 0.0, -1.0], (len(points), 1)), flat)
+
+    def distance(points: FloatArray) -> Distance:
+        found = [of_tool, *(bed.distance for bed in beds)]
+        count, dim = points.shape
+        gap, normal, curvature = np.empty(count), np.empty((count, dim)), np.empty((count, dim, dim))
+        for number, of in enumerate(found):
+            part = body.part(number)
+            own = of(part.of(points))
+            gap[part.nodes], normal[part.nodes], curvature[part.nodes] = own.gap, own.normal, own.curvature
+        return Distance(gap, normal, curvature)
+
+    if not tool.beds:
+        return PlacedTool(of_tool, complete, neighbours.followers, depth)
+    beds = tool.beds
+    if body.law.is_linear:
+        beds = tuple(bed.at_rest(body.part(n).candidates.points) for n, bed in enumerate(tool.beds, start=1))
+    return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool))
+
+
+def _resting(body: DeformedBody, tool: Tool) -> Resting:
+    """Return the nodes on the beds of a ``tool``; without an earlier contact, all of them touch."""
+    count = len(body.candidates)
+    nodes, stick = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    for number, bed in enumerate(tool.beds, start=1):
+        nodes[body.part(number).nodes] = True
+        stick[body.part(number).nodes] = bed.sticks
+    begin = nodes if tool.begins is None else tool.begins
+    return Resting(nodes, begin, stick, body.places)

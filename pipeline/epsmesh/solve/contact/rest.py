@@ -1,0 +1,82 @@
+"""What a bed does to the body that rests on it: reaction, and area in contact."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from epsmesh.arrays import FloatArray
+from epsmesh.solve.contact.bed import Bed
+from epsmesh.solve.contact.deformed import ContactSolution
+from epsmesh.solve.contact.geometry import Area, contact_area
+from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.turned import turned_frames
+from epsmesh.solve.contact_result import RestResult
+from epsmesh.solve.response import whole_force
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A ``bed`` that has ``touched`` its ``candidates``; ``modulus`` (n) is E / (1 - ν²) of the tissue there (Pa).
+
+    Points and forces are those of the modelled part, bounded by planes of symmetry normal to the axes ``mirrored``.
+    """
+
+    bed: Bed
+    candidates: Candidates
+    touched: ContactSolution
+    modulus: FloatArray
+    mirrored: tuple[int, ...]
+
+    @property
+    def force(self) -> FloatArray:
+        """The force (3), N, of the bed on the modelled part."""
+        return np.asarray(self.touched.forces.sum(axis=0))
+
+    @cached_property
+    def area(self) -> Area:
+        """The area in contact, in the plane of the bed, with the bar by the size of elements at its edge."""
+        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
+        axes[-1] *= -1.0  # as a tool that presses along its last axis
+        seen = replace(self.candidates, points=self.candidates.points @ axes.T)
+        touched = replace(self.touched, forces=self.touched.forces @ axes.T)
+        found = contact_area(seen, touched, self.modulus, self.mirrored)
+        return replace(found, value=min(found.value, float(seen.areas.sum())))
+
+    @property
+    def bar(self) -> float:
+        """The relative bar on the area: by the size of elements, and by nodes that neither press nor are clear."""
+        unsure = ~self.touched.active & (self.touched.gap < 0)
+        return self.area.bar + float(np.abs(self.candidates.weights[unsure]).sum()) / self.area.value
+
+    @property
+    def whole_area(self) -> float:
+        """The area (m²) of the modelled part that the bed may touch."""
+        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
+        return float(replace(self.candidates, points=self.candidates.points @ axes.T).areas.sum())
+
+    def result(self) -> RestResult:
+        """Return that of the whole body."""
+        whole = 2.0 ** len(self.mirrored)
+        x, y, z = map(float, whole_force(self.force, self.mirrored))
+        return RestResult(
+            force=(x, y, z),
+            normal=self.bed.normal,
+            area=whole * self.area.value,
+            lifted=whole * max(self.whole_area - self.area.value, 0.0),
+        )
+
+
+def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> tuple[Rest, ...]:
+    """Return what the ``beds`` of a ``body`` do, from what has ``touched`` all of its candidates."""
+    found = []
+    for number, bed in enumerate(beds, start=1):
+        part = body.part(number)
+        candidates = part.candidates
+        if not body.law.is_linear:
+            candidates = replace(candidates, points=part.of(body.positions()))
+        modulus = candidates.from_regions(body.law.plane_moduli)
+        found.append(Rest(bed, candidates, part.solution(touched), modulus, body.elements.body.mirrored))
+    return tuple(found)

@@ -1,0 +1,175 @@
+"""A support that lets go: closed forms, limits, balances, and bodies that float."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import minimize_scalar
+from scipy.special import gamma, jv
+
+from epsmesh.arrays import FloatArray
+from tests.cases import raw, refusal, solve
+
+BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
+LARGE = {"law": "neo-hookean", "poisson": 0.4}
+GRAVITY = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+DENSITY = 1060.0
+WEIGHT = DENSITY * 9.81 * 40e-3 * 40e-3 * 20e-3
+HEAVY = {"material": {"density": f"{DENSITY} kg/m^3"}, "load": GRAVITY}
+
+
+def on(friction: float | str = 0, **more: Any) -> dict[str, Any]:
+    """Return a body that rests on its bottom."""
+    return {"fixed": "none", "support": {"on": "bottom", "friction": friction}, **more}
+
+
+def one(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> Any:
+    """Return the record of one case."""
+    (record,) = solve(comm, **changes).values()
+    return record
+
+
+def receding_radius() -> float:
+    """Return the radius of contact, over its thickness, of a layer pressed on a rigid smooth plane by a point force.
+
+    With q and p the Hankel transforms of the pressures on top and bottom, the bottom's deflection is that of a free
+    layer: ((q - p) A - (q + p) S) / 2, with A and S those of opposite and equal pressures on both faces. It is constant
+    where the bottom touches. p is a sum of (1 - r²/a²)^(j + 1/2), zero at the edge a.
+    """
+    share = (np.arange(8000) + 0.5) / 8000
+    wave, weight = 100 * share**2, 200 * share / 8000
+    bounded = np.minimum(wave, 40.0)
+    opposite = (np.cosh(bounded) + 1) / (np.sinh(bounded) - bounded) / wave
+    equal = (np.cosh(bounded) - 1) / (np.sinh(bounded) + bounded) / wave
+
+    def pressure(order: int, a: float) -> FloatArray:
+        power = order + 0.5
+        return np.asarray(2 ** (power + 1) * gamma(power + 2) * jv(power + 1, a * wave) / (a * wave) ** (power + 1))
+
+    def uneven(a: float) -> float:
+        radii = a * np.sin(np.linspace(0.02, 0.98 * np.pi / 2, 30))
+        waves = np.array([jv(0, wave * r) - np.exp(-(wave**2)) for r in radii])  # but for a constant
+        own = [pressure(order, a) for order in range(6)]
+        columns = np.array([waves @ ((opposite * (1 - p) - equal * (1 + p)) / 2 * wave * weight) for p in own]).T
+        system = np.column_stack([columns[:, 1:] - columns[:, :1], np.ones(len(radii))])
+        shares = np.linalg.lstsq(system, -columns[:, 0], rcond=1e-13)[0]
+        return float(np.linalg.norm(system @ shares + columns[:, 0]))
+
+    return float(minimize_scalar(uneven, bounds=(0.9, 1.4), method="bounded").x)
+
+
+def test_a_layer_that_is_pressed_at_a_point_lifts_off_at_the_radius_of_theory_at_any_load():
+    thick, radius = 10e-3, 40e-3
+    body = on(shape="cylinder", radius="40 mm", height="10 mm", size=None)
+    mesh = {"rim": "0.1 mm", "growth": 0.3, "fine": "3 mm"}
+    touching = []
+    for depth in ("0.05 mm", "0.1 mm"):
+        found = one(body=body, probe=BALL | {"radius": "2 mm", "depth": depth}, mesh=mesh)
+        touching.append(np.pi * radius**2 - found.largest["lift_off_area"])
+        assert found.balance < 1e-8
+        assert found.largest["support_force"] == pytest.approx(found.force, rel=1e-8)
+    measured, theory = np.sqrt(touching[1] / np.pi) / thick, receding_radius()
+    assert theory == pytest.approx(1.0935, rel=2e-3)
+    assert measured == pytest.approx(theory, rel=0.015)
+    assert found.largest["lift_off_area_error"] > abs(touching[1] - np.pi * (theory * thick) ** 2)
+    assert touching[0] == pytest.approx(touching[1], rel=5e-3)
+
+
+@pytest.mark.parametrize("material", [{}, LARGE, LARGE | {"poisson": 0.49}], ids=["linear", "large", "mixed"])
+@pytest.mark.parametrize("load", [{}, HEAVY], ids=["light", "heavy"])
+def test_a_body_that_sticks_and_lifts_nowhere_is_one_that_is_fixed(load, material):
+    changes = {key: dict(value) for key, value in load.items()}
+    changes["material"] = material | changes.get("material", {})
+    fixed, rests = (one(probe=BALL, body=body, **changes) for body in ({}, on("stick")))
+    assert rests.force == pytest.approx(fixed.force, rel=1e-7)
+    assert rests.contact_area == pytest.approx(fixed.contact_area, rel=1e-7)
+    assert rests.largest["lift_off_area"] < 1e-9 * 40e-3**2
+    assert rests.largest["support_force"] == pytest.approx(rests.force + bool(load) * WEIGHT, rel=1e-8)
+
+
+@pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
+def test_friction_of_the_tool_is_that_on_a_fixed_body(material):
+    fixed, rests = (one(probe=BALL | {"friction": 0.3}, body=body, material=material) for body in ({}, on("stick")))
+    assert rests.force == pytest.approx(fixed.force, rel=1e-5)
+    assert rests.friction_force == pytest.approx(fixed.friction_force, rel=1e-3)
+
+
+def test_a_smooth_support_is_softer_and_weight_presses_a_body_on():
+    stuck, smooth, heavy = (
+        one(probe=BALL, body=on("stick")),
+        one(probe=BALL, body=on()),
+        one(probe=BALL, body=on(), **HEAVY),
+    )
+    assert smooth.force < stuck.force
+    assert smooth.largest["lift_off_area"] > smooth.largest["lift_off_area_error"]
+    assert heavy.largest["lift_off_area"] == pytest.approx(0, abs=1e-12)
+    assert heavy.largest["support_force"] == pytest.approx(heavy.force + WEIGHT, rel=1e-8)
+
+
+def test_an_end_that_is_pressed_lifts_the_other_and_forces_turn_no_body():
+    """A slice pressed near one end lifts off at the other: all forces are below the tool."""
+    slice_ = on("stick", size=["40 mm", "16 mm", "8 mm"])
+    found = one(probe=BALL | {"radius": "3 mm", "at": ["12 mm", "0 mm"]}, body=slice_, mesh={"fine": "3 mm"})
+    assert found.largest["lift_off_area"] > 0.3 * 40e-3 * 16e-3
+    assert found.largest["lift_off_area_error"] < found.largest["lift_off_area"]
+    assert found.largest["support_force"] == pytest.approx(found.force, rel=1e-8)
+
+
+def test_the_work_of_the_tool_is_the_energy():
+    shares = np.linspace(0, 1, 5)[1:]
+    depths = [f"{0.5 * share**2:.6g} mm" for share in shares]
+    probe = BALL | {"depth": depths, "mesh_depths": [depths[0], depths[-1]]}
+    found = [record for _, record in sorted(solve(probe=probe, body=on(), mesh={"rim": "0.3 mm"}).items())]
+    # With d = t², F dd = 2 t F dt: Simpson's rule in t.
+    slopes = [0.0, *(2 * 0.5e-3 * share * record.force for share, record in zip(shares, found, strict=True))]
+    work = (slopes[0] + 4 * slopes[1] + 2 * slopes[2] + 4 * slopes[3] + slopes[4]) / 12
+    assert work == pytest.approx(found[-1].energy, rel=0.01)
+
+
+def test_an_inclined_tool_that_lifts_nothing_presses_as_on_a_fixed_body():
+    probe = BALL | {"axis": [0.1045, 0.0, -0.9945]}
+    material = LARGE | {"density": f"{DENSITY} kg/m^3"}
+    fixed, rests = (one(probe=probe, body=body, material=material, load=GRAVITY) for body in ({}, on("stick")))
+    assert rests.force == pytest.approx(fixed.force, rel=1e-7)
+    along = rests.force_vector[2] + WEIGHT  # the force on the tool is that on the body, reversed
+    assert rests.largest["support_force"] == pytest.approx(along, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"body": on(), "probe": BALL | {"at": ["3 mm", "0 mm"]}}, "lets it move along x"),
+        (
+            {"body": on("stick"), "probe": BALL, **HEAVY, "load": {"gravity": ["0 m/s^2", "0 m/s^2", "9.81 m/s^2"]}},
+            "does not settle on its support",
+        ),
+    ],
+    ids=["slides away", "falls up"],
+)
+def test_a_body_that_floats_fails_with_what_does_not_hold_it(changes, said):
+    found = one(**changes)
+    assert found.status == "failed"
+    assert said in found.message
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"body": on(0.3)}, 'must be 0 or "stick"'),
+        ({"body": on() | {"fixed": "bottom"}}, 'must be "none" with [body.support]'),
+        ({"body": on(), "probe": {"contact": "bonded"}}, "found together"),
+        ({"body": on("stick"), "probe": BALL | {"history": {"ramp": "1 s", "hold": "1 s"}}}, "lifts off no support"),
+        ({"body": {"shape": "ellipsoid", "size": None, "axes": ["30 mm"] * 3} | on()}, "an ellipsoid has no support"),
+    ],
+    ids=["number", "fixed", "bonded", "in time", "ellipsoid"],
+)
+def test_what_is_not_computed_is_refused(changes, said):
+    assert said in refusal(raw(**{"probe": BALL} | changes))
+
+
+@pytest.mark.mpi
+def test_ranks_agree():
+    alone, both = (one(comm, probe=BALL, body=on(), material=LARGE) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    assert both.force == pytest.approx(alone.force, rel=1e-7)
+    assert both.largest["lift_off_area"] == pytest.approx(alone.largest["lift_off_area"], rel=1e-6)
