@@ -20,7 +20,7 @@ def name_of(requirement):
 
 
 REQUIRED = {name_of(one) for one in PROJECT["dependencies"]}
-OPTIONAL = {name_of(one) for extra in ("solver", "images", "organs", "repair") for one in EXTRAS[extra]}
+OPTIONAL = {name_of(one) for extra in ("solver", "images", "organs", "repair", "torch", "jax") for one in EXTRAS[extra]}
 OPTIONAL -= {PROJECT["name"]}
 # Distributions whose modules have other names.
 MODULES = {
@@ -78,7 +78,8 @@ def test_the_evaluator_needs_what_its_own_distribution_declares():
     files = [path for path in files if path.name not in ("setup.py", "extension.py")]
     nodes = [node for path in files for node in ast.walk(ast.parse(path.read_text()))]
     names = {name for node in nodes for name in named(node)[0]} - sys.stdlib_module_names - {"epsmesh_realtime"}
-    assert names == {name_of(one) for one in project["dependencies"]}
+    optional = [one for listed in project["optional-dependencies"].values() for one in listed]
+    assert names == {name_of(one) for one in [*project["dependencies"], *optional]}
 
 
 def test_who_made_it_and_on_which_terms_is_told_alike():
