@@ -17,8 +17,8 @@ from epsmesh.solve.contact.contact_steps import (
     reach_contact,
     reach_contact_with_friction,
 )
-from epsmesh.solve.contact.large import placed_tool
 from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
@@ -38,7 +38,7 @@ def test_drag_at_constant_depth_is_the_law_times_the_force():
         problem = QuasiStaticProblem(spaces, 2, WITHOUT_FOOTPRINT, case.way.element, tool=tool_of(case))
         body = DeformedBody(problem.elements, Surface(spaces), law_of(case), "direct", stack)
         tool, path = tool_of(case), ContactPath(ContactPathPoint(0.0, np.zeros_like(body.state)))
-        friction = Friction.on(body, FRICTION, DEPTH)
+        friction = Friction.on(body, tool, DEPTH)
         reach_contact_with_friction(body, lambda depth: placed_tool(body, tool, depth), path, DEPTH, friction, 4)
 
         def beside(travel):

@@ -243,7 +243,11 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("slit", "terms", f"a slit {_WITH_TERMS} is not computed: {_NO_TERMS}"),
     Refusal("slice", "terms", f"must be 0 mm {_WITH_TERMS}: the blade only presses"),
     Refusal("insertion", "terms", f"cuts in tissue {_WITH_TERMS} are not computed: {_NO_TERMS}"),
-    Refusal("half ball", "terms", f"the far field has none of those of [load], capsule and support: {_COARSE}"),
+    Refusal(
+        "half ball",
+        "terms",
+        f"the far field has neither those of [load], nor a capsule, nor a support that lets go: {_COARSE}",
+    ),
     Refusal("truncated body", "terms", f"they act on the whole body, so no part of it may be cut away: {_COARSE}"),
     Refusal("degree 1", "terms", f"is too low {_WITH_TERMS}: use 2 or 3"),
     Refusal(
