@@ -407,6 +407,7 @@ def test_a_layer_is_a_load_on_the_regular_part_of_the_skin():
         assert scope.young * touch.force[2] == pytest.approx(force, rel=most)
 
 
+@pytest.mark.nightly
 def test_a_capsule_of_a_region_is_a_load_on_the_regular_part():
     """F of the model is that of a full solve, which does not know the regular part; without the capsule it is less."""
     nodule = TUMOUR | {"at": ["0 mm", "0 mm", "-8 mm"], "radius": "5 mm", "young": "20 kPa"}

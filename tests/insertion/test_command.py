@@ -141,12 +141,6 @@ def test_view_writes_a_film_of_the_path(ran, epsmesh):
     assert phases == ["indentation", "puncture", "cutting", "cutting", "cutting"]
 
 
-def test_a_path_has_no_real_time_model(ran, epsmesh):
-    folder, _ = ran
-    done = epsmesh("export", folder / "pad.toml", "--output", folder)
-    assert done.exit_code == 2 and "probe.insertion: a path has no real-time model" in done.stderr
-
-
 def test_two_layers_have_two_punctures_and_a_withdrawal_by_solves(tmp_path):
     """The lower one is tougher. Above the interface, the withdrawal's force is the change of the solved energies."""
     layer = {"name": "soft", "thickness": "2 mm", "young": "12 kPa", "poisson": 0.3, "toughness": "1.5 J/m^2"}

@@ -91,7 +91,8 @@ def test_a_body_that_sticks_and_lifts_nowhere_is_one_that_is_fixed(load, materia
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_tool_is_that_on_a_fixed_body(material):
     fixed, rests = (one(probe=BALL | {"friction": 0.3}, body=body, material=material) for body in ({}, on("stick")))
-    assert rests.force == pytest.approx(fixed.force, rel=1e-5)
+    # Both searches end where Coulomb's law holds within a tolerance, which is 1e-4 of F on some meshes.
+    assert rests.force == pytest.approx(fixed.force, rel=3e-4)
     assert rests.friction_force == pytest.approx(fixed.friction_force, rel=1e-3)
 
 

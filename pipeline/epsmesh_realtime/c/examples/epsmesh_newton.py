@@ -11,6 +11,7 @@ are copied, and the step cannot be part of a captured graph.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import newton
 import numpy as np
@@ -29,7 +30,7 @@ class Tissues:
 
     def __init__(
         self, file: str, model: newton.Model, bodies: Sequence[int], radius: float, *,
-        organs: object = (0.0, 0.0, 0.0), offset: Sequence[float] = (0.0, 0.0, 0.0),
+        organs: Any = (0.0, 0.0, 0.0), offset: Sequence[float] = (0.0, 0.0, 0.0),
     ):  # fmt: skip
         self.face, self.bodies, self.radius = epsmesh_realtime.read(file), np.asarray(bodies), radius
         self.organs, self.offset = np.broadcast_to(organs, (len(bodies), 3)), np.asarray(offset, dtype=float)
