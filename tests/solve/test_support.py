@@ -88,6 +88,17 @@ def test_a_body_that_sticks_and_lifts_nowhere_is_one_that_is_fixed(load, materia
     assert rests.largest["support_force"] == pytest.approx(rests.force + bool(load) * WEIGHT, rel=1e-8)
 
 
+@pytest.mark.parametrize("tension_only", [False, True])
+def test_a_capsule_within_the_body_holds_it_no_more_than_the_support_does(tension_only):
+    """It resists no motion of the whole body; off the centre, no plane of symmetry does either."""
+    capsule = {"young": "0.2 MPa", "thickness": "0.1 mm", "poisson": 0.4, "tension_only": tension_only}
+    cyst = {"name": "cyst", "at": ["6 mm", "3 mm", "-8 mm"], "radius": "3 mm", "young": "20 kPa"}
+    cyst |= {"poisson": 0.4, "capsule": capsule}
+    fixed, rests = (one(probe=BALL, body=body | {"inclusion": [cyst]}) for body in ({}, on("stick")))
+    assert rests.force == pytest.approx(fixed.force, rel=1e-6)
+    assert "floats" in one(probe=BALL, body=on() | {"inclusion": [cyst]}).message
+
+
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_tool_is_that_on_a_fixed_body(material):
     fixed, rests = (one(probe=BALL | {"friction": 0.3}, body=body, material=material) for body in ({}, on("stick")))

@@ -311,16 +311,19 @@ def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None
     modes = np.array([motion.ravel() for motion in motions.values()])
     is_own = np.arange(3)[:, None] != np.array(planes, dtype=int)  # a move along a plane is its own image there
     images = np.vstack([is_own, ~is_own])
+    # A term within the body resists no rigid motion, but for rounding: stretches of the body say how stiff terms are.
+    tried = np.vstack([modes, [(away * axis).ravel() for axis in np.eye(3)]])
     with space.at_rest():
-        forces = sum((np.array([product(term, mode) for mode in modes]) for term in space.terms), np.zeros(modes.shape))
-    stiffness = global_sum(space.comm, (modes @ forces.T).ravel()).reshape(len(modes), -1)
-    stiffness += _of_beds(space, modes, beds, float(np.trace(stiffness)))
+        forces = sum((np.array([product(term, mode) for mode in tried]) for term in space.terms), np.zeros(tried.shape))
+    works = global_sum(space.comm, (tried @ forces.T).ravel()).reshape(len(tried), -1)
+    stiffness, size = works[: len(modes), : len(modes)], float(np.trace(works))
+    stiffness += _of_beds(space, modes, beds, size)
     stiffness *= (images[:, None] == images).all(axis=2)
     if rests:  # along a bed it slides without work: its place is that of the model
         kept = images.all(axis=1)
         motions, stiffness = dict(compress(motions.items(), kept)), stiffness[np.ix_(kept, kept)]
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
-    if not values[0] > _FREE * abs(values[-1]):
+    if not values[0] > _FREE * max(abs(values[-1]), size):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
         if rests:
             raise SolveError(
