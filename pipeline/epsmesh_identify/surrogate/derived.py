@@ -93,8 +93,8 @@ def _elastic(raw: Mapping[str, Any]) -> dict[str, Any]:
     for section, key in (("probe", "history"), ("material", "relaxation")):
         if isinstance(table := found.get(section), dict):
             found[section] = {name: value for name, value in table.items() if name != key}
-    for section in ("material", "body"):
-        found[section] = _without_spread(found.get(section))
+    for section in {"material", "body"} & found.keys():  # layers may leave nothing for a [material]
+        found[section] = _without_spread(found[section])
     found["solve"] = {**found.get("solve", {}), "exact": False, "timing": False, "influence": False}
     return found
 
