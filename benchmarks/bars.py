@@ -359,7 +359,12 @@ def campaign(
 
 def main(arguments: list[str]) -> int:
     """Run, write, and return the exit status: 1 if bars do not hold."""
-    lines = table(campaign(arguments, __doc__, "bars", scene, report))
+    return status(campaign(arguments, __doc__, "bars", scene, report))
+
+
+def status(rows: list[Row]) -> int:
+    """Return the exit status: 1 if bars do not hold on all scenes, or on a class of enough of them."""
+    lines = table(rows)
     return int(not lines or any(
         line["share"] < HELD for line in lines if line["scenes"] >= ENOUGH or line["class"] == "all"
     ))  # fmt: skip

@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from benchmarks.bars import ENOUGH, HELD, Drawn, Row, campaign, limit_processor, relative_bar, table
+from benchmarks.bars import Drawn, Row, campaign, limit_processor, relative_bar, status
 from benchmarks.bars import report as told_of
 from benchmarks.peers.processes import PEERS_PYTHON
 from benchmarks.processor import ROOT
@@ -136,10 +136,7 @@ def report(rows: list[Row]) -> str:
 
 def main(arguments: list[str]) -> int:
     """Run, write, and return the exit status: 1 if bars do not hold."""
-    lines = table(campaign(arguments, __doc__, "strangers", scene, report, judged, _COUNT))
-    return int(not lines or any(
-        line["share"] < HELD for line in lines if line["scenes"] >= ENOUGH or line["class"] == "all"
-    ))  # fmt: skip
+    return status(campaign(arguments, __doc__, "strangers", scene, report, judged, _COUNT))
 
 
 if __name__ == "__main__":
