@@ -81,7 +81,6 @@ def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
     """Solve a scene on each mesh, with one degree more, and its truth; recover its stress where that says something."""
     start = limit_processor(_LIMIT)
     study, classes = drawn(seed, folder)
-    finest = scaled(study, SIZES[-1])
     known: dict[str, float] = {}
 
     def row(result: str, bar: float = math.nan) -> Row:
@@ -89,6 +88,7 @@ def judged(seed: int, folder: Path, drawn: Drawn) -> Row:
 
     if reason := unfit(study, classes):
         return row(reason)
+    finest = scaled(study, SIZES[-1])
     if seconds(finest, folder) > _SHORT:
         return row("takes too long")
     # The first solve of a process also imports and compiles: the coarsest mesh comes first.

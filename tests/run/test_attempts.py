@@ -14,6 +14,7 @@ from epsmesh.run.progress import Progress
 from epsmesh.run.record import Record
 from epsmesh.run.runner import StepRunner
 from epsmesh.study.read import parse
+from tests import cases
 from tests.cases import raw, study
 
 WORLD = MPI.COMM_WORLD
@@ -212,3 +213,38 @@ def test_a_force_that_failed_is_no_yardstick():
     assert data["force"].notnull().values.tolist() == [True, False]
     for name in ("force_max", "force_ratio", "force_exact", "force_exact_ratio"):
         assert data[name].isnull().all(), name
+
+
+SMALL = {"shape": "sphere", "radius": "4 mm", "contact": "unilateral"}
+
+
+def of_hertz(depth: float, poisson: float) -> float:
+    """Return F (N) of a ball of 4 mm in 10 kPa at a ``depth`` (m), by H. Hertz."""
+    return 4 / 3 * 1e4 / (1 - poisson**2) * 4e-3**0.5 * depth**1.5
+
+
+@pytest.mark.parametrize(
+    ("at", "poisson", "depth", "growth"),
+    [(["0 mm", "0 mm"], 0.42, "0.004 mm", 0.8), (["1.3 mm", "-2.1 mm"], 0.42, "0.0158 mm", 0.4)],
+    ids=["7.9 half widths, on the axis", "4 half widths, beside it"],
+)
+def test_bars_of_a_contact_smaller_than_the_elements_hold(at, poisson, depth, growth):
+    """One degree more changes F by 1 %, while it is a tenth or a quarter too high."""
+    probe, mesh = {**SMALL, "at": at, "depth": depth}, {"rim": "1 mm", "fine": "3 mm", "growth": growth}
+    (found,) = cases.solve(probe=probe, mesh=mesh, material={"poisson": poisson}).values()
+    exact = of_hertz(float(depth.split()[0]) * 1e-3, poisson)
+    assert abs(found.force - exact) <= found.force_error * found.force
+    assert found.contact_area_error >= found.force_error > 0.2
+
+
+@pytest.mark.parametrize(
+    ("depth", "words"),
+    [
+        ("1e-4 mm", "elements are 50 times as large as the contact's half width: F is not proved"),
+        ("1e-11 mm", "gmsh leaves out the edge of the contact"),
+    ],
+)
+def test_a_contact_far_smaller_than_the_elements_is_refused_in_words(depth, words):
+    (found,) = cases.solve(probe={**SMALL, "depth": depth}, mesh={"rim": "1 mm"}).values()
+    assert found.status == "failed"
+    assert words in found.message

@@ -87,7 +87,7 @@ def test_contact_on_few_nodes_has_an_error_bar_that_tells_how_coarse_its_element
     """A cone that touches four nodes: Sneddon's force, corrected for the finite body."""
     (found,) = swept({"rim": "0.3 mm", "degree": degree}, [0.02], CONE | {"mesh_depths": ["0.02 mm", "0.2 mm"]})
     exact = known.half_space_cone(10e3, 0.3, radians(86), 0.02e-3)
-    assert abs(found.force / exact - 1) < found.force_error < 0.15
+    assert abs(found.force / exact - 1) < found.force_error < 0.2
 
 
 def test_small_depths_on_the_mesh_of_a_range_have_bars_and_areas_that_are_worth_something():

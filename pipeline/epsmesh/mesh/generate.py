@@ -225,6 +225,9 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = position[corners_of(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group))]
     assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
+    if not rim_curves:
+        why = "gmsh leaves out the edge of the contact, which is too small beside the body: use a larger depth"
+        raise GeometryError(why)
     rim = [position[mesh.getNodes(1, curve, includeBoundary=True)[0]] for curve in rim_curves]
     # Used points are renumbered without gaps.
     used, rim_points = np.zeros(len(points), dtype=bool), np.unique(np.concatenate(rim))

@@ -3,8 +3,9 @@
 from dataclasses import replace
 from math import isfinite, nan
 
+from epsmesh import fitted
 from epsmesh.plan.steps import Solve
-from epsmesh.run.measure import add_times
+from epsmesh.run.measure import add_times, least_bar, size_at_contact
 from epsmesh.run.record import Record
 from epsmesh.states import FAILED
 
@@ -62,10 +63,18 @@ def _checked(solve: Solve, record: Record) -> Record:
         return failed(record, f"the computed force is {record.force}")
     if not isfinite(bar) and (solve.goal is not None or not record.message):
         return failed(record, f"the computed error bar is {bar}")
-    if solve.goal is None and bar > _WORST_BAR:
-        why = f"error bar {100 * bar:.0f} % of F, above {100 * _WORST_BAR:.0f} %: F is not proved on this mesh"
-        return failed(record, f"{why}; use a smaller `rim` or `fine`")
+    if solve.goal is None and (why := _unproved(solve, bar)):
+        return failed(record, f"{why}: F is not proved on this mesh; use a smaller `rim` or `fine`")
     return failed(record, f"the computed error bar is {bar:.2g}") if bar < 0 else _without_wide_release(record)
+
+
+def _unproved(solve: Solve, bar: float) -> str:
+    """Return why a mesh does not prove a force of the relative ``bar``; empty if it does."""
+    if bar > _WORST_BAR:
+        return f"error bar {100 * bar:.0f} % of F, above {100 * _WORST_BAR:.0f} %"
+    if least_bar(solve) <= fitted.MOST_UNRESOLVED:
+        return ""
+    return f"elements are {size_at_contact(solve.case):.2g} times as large as the contact's half width"
 
 
 def _without_wide_release(record: Record) -> Record:

@@ -18,7 +18,7 @@ from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.convergence import Convergence
-from epsmesh.solve.estimate import is_fine, is_graded
+from epsmesh.solve.estimate import is_fine, is_graded, unresolved
 from epsmesh.solve.history import History
 from epsmesh.solve.solution import Solution
 from epsmesh.states import OK
@@ -44,6 +44,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
     kind, planned_cells, poisson = features(solve)
     if solve.goal is not None and not solve.axisymmetric:
         solution = solution.extrapolated(convergence_of(solve))
+    solution = solution.with_least_bar(least_bar(solve))
     # The solution is in the frame where the probe presses along -z; the record is in the body's coordinates.
     turn, force, bar = case.frame.turn, solution.reaction[2], solution.reaction_bars[2]
     return Record(
@@ -196,6 +197,17 @@ def is_graded_to_contact(case: Case) -> bool:
             return False
     sure = has_sure_contact(case) and case.mesh.degree == 2
     return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_nonlinear, sure=sure)
+
+
+def least_bar(solve: Solve) -> float:
+    """Return the least relative bar on F: zero, but for contact that is found with elements larger than itself."""
+    is_given = not solve.case.way.is_found or solve.axisymmetric
+    return 0.0 if is_given else unresolved(size_at_contact(solve.case))
+
+
+def size_at_contact(case: Case) -> float:
+    """Return the size of elements at the edge of contact, in units of its expected half width."""
+    return case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
 
 
 def _rim(case: Case) -> float:

@@ -57,6 +57,10 @@ class ContactResult:
         remedy = 'law = "neo-hookean" presses what they bring there'
         return f"loads move the tissue below the probe by {by}, which a linear law leaves in its place: {remedy}"
 
+    def with_least_bar(self, share: float) -> "ContactResult":
+        """Return the contact with a relative bar on its area of at least ``share``, where it has one."""
+        return replace(self, bar=max(self.bar, share))  # max(nan, share) is NaN
+
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.
 

@@ -147,6 +147,11 @@ def found_again_bar(
     return 2 * share / fitted.FOUND, bar / (1 - min(bar, fitted.MOST))
 
 
+def unresolved(rim: float) -> float:
+    """Return the least relative bar on F where elements at the edge of contact, ``rim`` half widths, are too large."""
+    return rim / (rim + fitted.FOUND_UNRESOLVED) if rim > 1 else 0.0
+
+
 def extrapolate_found(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, known: Convergence
 ) -> tuple[FloatArray, FloatArray]:

@@ -169,6 +169,13 @@ class Solution:
         motions = self.response.movement.motions
         return any(g < 0 for g, motion in zip(self.front.gains, motions, strict=False) if any(motion.opening))
 
+    def with_least_bar(self, share: float) -> "Solution":
+        """Return the solution, for found contact with relative bars on F and area of at least ``share``."""
+        if self.bars is None or self.contact is None or not share:
+            return self
+        bars = np.maximum(self.bars, share * np.abs(self.stiffness))
+        return replace(self, bars=bars, contact=self.contact.with_least_bar(share))
+
     def extrapolated(self, known: Convergence) -> "Solution":
         """Return the limit of the sequence of degrees; unchanged without bars.
 

@@ -104,7 +104,7 @@ def level_line(points: FloatArray, facets: IntArray, below: float) -> FloatArray
     for k in range(3):
         start, end = points[crossed[:, k]], points[crossed[:, (k + 1) % 3]]
         crosses = over[crossed[:, k]] != over[crossed[:, (k + 1) % 3]]
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = (below - start[:, 2]) / (end[:, 2] - start[:, 2])
             ends.append(np.where(crosses[:, None], start + t[:, None] * (end - start), np.nan))
     found = np.stack(ends, axis=1)
