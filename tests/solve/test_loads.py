@@ -165,3 +165,19 @@ def test_the_bar_is_narrower_if_errors_are_at_different_places(element):
     assert found[0] == root and root > 2 * found[1] and found[1] > found[2] > 0.1 * root
     still = load_bars(bars, np.diag([1.0, 0.0]), element)  # loads that do no work
     assert np.array_equal(still, still.T) and still[0, 1] == root and np.array_equal(np.diag(still), np.diag(bars))
+
+
+@pytest.mark.parametrize("rim", ["0.5 mm", "2 mm"])
+def test_the_load_force_of_a_body_under_one_pressure_all_around_is_that_on_the_footprint(rim):
+    """Incompressible tissue has no strain then: elements are exact, but for the curved edge of the disc."""
+    pressures = [{"on": face, "pressure": "100 Pa"} for face in ("top", "sides")]
+    body = {"shape": "cylinder", "size": None, "radius": "20 mm", "height": "20 mm"}
+    (found,) = solve(
+        body=body,
+        material={"poisson": 0.5},
+        probe={"contact": "bonded"},
+        mesh={"rim": rim},
+        load={"traction": pressures},
+    ).values()
+    exact = 100 * pi * 3e-3**2
+    assert 1e-7 * exact < abs(found.load_force - exact) < found.load_force_error < 0.005 * exact
