@@ -64,15 +64,12 @@ def solve(study: Study, folder: Path, store: Path | None = None, at: Mapping[str
     from epsmesh.study.problems import StudyError
     from epsmesh.study.read import read_mapping
 
-    try:
-        declared = read_mapping(study, "same", folder)
-    except StudyError as error:
-        return Outcome("refused", " | ".join(str(problem) for problem in error.problems))
-    except Exception:
-        return Outcome("traceback", traceback.format_exc(limit=-3))
     with tempfile.TemporaryDirectory() as scratch:
         try:
+            declared = read_mapping(study, "same", folder)
             dataset = workflow.solve(declared, MPI.COMM_SELF, store or Path(scratch) / "cases.sqlite")
+        except StudyError as error:  # of its text, or of its plan
+            return Outcome("refused", " | ".join(str(problem) for problem in error.problems))
         except (StoreError, Exception):
             return Outcome("traceback", traceback.format_exc(limit=-3))
     return of_dataset(dataset, at)
