@@ -17,6 +17,7 @@ from tests.solve.test_mixed import make_mesh
 class Side:
     space: Any
     prescribed: np.ndarray
+    children: np.ndarray | None = None
 
 
 def polynomial(degree):

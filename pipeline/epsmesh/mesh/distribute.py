@@ -24,6 +24,10 @@ class BodyMesh:
     ``regions`` are the region numbers of local cells, ghosts included; None for a body of one material. ``deviation``
     (m) is the largest distance of its points from the surface in a file of triangles; NaN for other bodies. Where the
     mesh is that of a body without load, ``imaged`` (n, 3), m, are its nodes as the study gives them, under load.
+
+    The last ``refinements`` of a coarser mesh cut its cells in eight: those of one are on one rank, one after the other
+    in the order in which the cells were passed to dolfinx. In this order ``beyond`` (cells, 4) are the ranks that have
+    the cell next to each of this rank, -1 for itself or none.
     """
 
     mesh: Any
@@ -32,6 +36,8 @@ class BodyMesh:
     regions: Int32Array | None = None
     deviation: float = nan
     imaged: FloatArray | None = None
+    refinements: int = 0
+    beyond: Int32Array | None = None
 
     @property
     def shown(self) -> FloatArray:
@@ -86,7 +92,15 @@ def distribute_parts(comm: MPI.Comm, part: Part) -> BodyMesh:
     small = _narrow(arrays.regions)
     regions = None if small is None else np.concatenate(comm.allgather(small))
     count = comm.allreduce(len(arrays.cells))
-    return BodyMesh(mesh, _find_facets(mesh, surface), count, _of_cells(mesh, regions), arrays.deviation)
+    return BodyMesh(
+        mesh,
+        _find_facets(mesh, surface),
+        count,
+        _of_cells(mesh, regions),
+        arrays.deviation,
+        refinements=part.refinements,
+        beyond=part.beyond,
+    )
 
 
 def _narrow(regions: IntArray | None) -> IntArray | None:

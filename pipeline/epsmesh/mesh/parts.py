@@ -34,13 +34,14 @@ class Part:
     The last point of ``mesh`` belongs to no cell: it replaces, in triangles, points that only other parts have. Groups
     of triangles have all that touch a point of this part. ``numbers`` (n) are those of its points in the whole mesh,
     below ``count``. ``beyond`` (m, 4) is the rank that has the cell beyond each face, opposite a corner; -1 where that
-    is this rank, or nothing.
+    is this rank, or nothing. The last ``refinements`` of its cells were made in eights, whose order is kept.
     """
 
     mesh: MeshArrays
     numbers: IntArray
     count: int
     beyond: Int32Array
+    refinements: int = 0
 
 
 @stage("parts")
@@ -57,8 +58,10 @@ def split(mesh: MeshArrays, ranks: int, *, is_refined: bool = False) -> list[Par
         owner = np.repeat(compat.partition(mesh.cells[:, 0].reshape(-1, 8)[:, :4], ranks), 8)
     else:
         owner = compat.partition(mesh.cells[:, :4], ranks)
-    beyond = _beyond(mesh.cells, owner)
-    return [_part(mesh, np.flatnonzero(owner == rank), beyond) for rank in range(ranks)]
+    beyond, times = _beyond(mesh.cells, owner), 0
+    if is_refined:
+        times = int((owner.reshape(-1, 8) == owner[::8, None]).all())
+    return [_part(mesh, np.flatnonzero(owner == rank), beyond, times) for rank in range(ranks)]
 
 
 def _beyond(cells: IntArray, owner: Int32Array) -> Int32Array:
@@ -74,7 +77,7 @@ def _beyond(cells: IntArray, owner: Int32Array) -> Int32Array:
     return result.reshape(-1, 4)
 
 
-def _part(mesh: MeshArrays, chosen: IntArray, beyond: Int32Array) -> Part:
+def _part(mesh: MeshArrays, chosen: IntArray, beyond: Int32Array, refinements: int) -> Part:
     """Return the part of the ``chosen`` cells."""
     numbers = np.unique(mesh.cells[chosen])
     local = np.full(len(mesh.points), len(numbers))
@@ -93,7 +96,7 @@ def _part(mesh: MeshArrays, chosen: IntArray, beyond: Int32Array) -> Part:
         regions=None if mesh.regions is None else mesh.regions[chosen],
         interfaces=None if mesh.interfaces is None else touching(mesh.interfaces),
     )
-    return Part(own, np.append(numbers, -1), len(mesh.points), beyond[chosen])
+    return Part(own, np.append(numbers, -1), len(mesh.points), beyond[chosen], refinements)
 
 
 @stage("refinement")
@@ -114,7 +117,7 @@ def refine(part: Part, scene: Scene, comm: MPI.Comm) -> Part:
     beyond = np.take_along_axis(np.repeat(part.beyond, 8, axis=0), np.maximum(carriers, 0), axis=1)
     beyond[carriers < 0] = -1
     curved = curve(fine, scene, agree=partial(_agree, part, comm))
-    return Part(curved, _labels(part, curved), part.count**2, beyond)
+    return Part(curved, _labels(part, curved), part.count**2, beyond, part.refinements + 1)
 
 
 def _agree(part: Part, comm: MPI.Comm, edges: IntArray, chosen: BoolArray) -> tuple[BoolArray, bool]:
@@ -144,7 +147,7 @@ def reflect_part(part: Part, planes: tuple[str, ...]) -> Part:
     for plane in planes:
         numbers = reflect_labels(part.mesh, part.numbers, part.count, plane)
         beyond = np.vstack([part.beyond, part.beyond[:, [0, 1, 3, 2]]])
-        part = Part(reflect(part.mesh, (plane,)), numbers, 2 * part.count, beyond)
+        part = Part(reflect(part.mesh, (plane,)), numbers, 2 * part.count, beyond, part.refinements)
     return part
 
 
@@ -185,7 +188,7 @@ def renumbered(part: Part, comm: MPI.Comm) -> tuple[Part, BoolArray]:
     numbers[own] = sum(counts[: comm.rank]) + np.arange(count)
     numbered = np.concatenate(exchanged(numbers[which]))
     numbers[which] = answered(numbered[first][inverse.reshape(-1)])
-    return Part(part.mesh, numbers, sum(counts), part.beyond), own
+    return replace(part, numbers=numbers, count=sum(counts)), own
 
 
 def whole(part: Part) -> MeshArrays:

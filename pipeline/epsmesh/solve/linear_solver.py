@@ -1,7 +1,8 @@
 """The linear solver for elasticity: a factorisation, or conjugate gradients preconditioned by a multigrid cycle.
 
-The cycle coarsens in degree (p, p - 1, …, 1), :mod:`epsmesh.solve.kernels.multigrid`; below degree 1 it is hypre's
-BoomerAMG, or PETSc's GAMG where PETSc has no hypre.
+The cycle coarsens in degree (p, p - 1, …, 1), :mod:`epsmesh.solve.kernels.multigrid`, then to the meshes from which
+that of a refined body was cut, :mod:`epsmesh.solve.coarse_levels`. Below it is hypre's BoomerAMG, or PETSc's GAMG where
+PETSc has no hypre.
 """
 
 import itertools
@@ -15,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from epsmesh import compat
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.kernels.multigrid import Cycle, SmoothedLevel, free, interpolation
 from epsmesh.solve.kernels.product import operator_of
 from epsmesh.solve.krylov import INDEFINITE, algebraic, check_converged, explained, factorised, keep, solver_of
@@ -33,7 +34,7 @@ class Level:
     """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
 
     ``jumps`` says that the material jumps between regions. ``held`` are prescribed dofs that the operator ignores: the
-    multigrid cycle accounts for them.
+    multigrid cycle accounts for them. ``children``: see :class:`.Side`.
     """
 
     space: Any
@@ -41,6 +42,7 @@ class Level:
     prescribed: np.ndarray
     jumps: bool = False
     held: np.ndarray | None = None
+    children: Int32Array | None = None
 
     @property
     def degree(self) -> int:
@@ -56,7 +58,7 @@ class LinearSolver:
 
     @stage("set-up")
     def __init__(self, levels: list[Level], *, direct: bool, below: "LinearSolver | None" = None):
-        """Set up; collective. Operators above degree 1 are matrix-free unless the solver is ``direct``.
+        """Set up; collective. Operators above the first level are matrix-free unless the solver is ``direct``.
 
         ``below`` is a solver of all levels but the last, if there is one. Its set-up is shared, so it must live as
         long.

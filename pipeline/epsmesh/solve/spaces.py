@@ -18,6 +18,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.scene.model import FIXED, MIRROR, PROBE
 from epsmesh.solve import SolveError
+from epsmesh.solve.coarse_levels import CoarseSpace, coarse_space
 from epsmesh.solve.compiled import assemble, fill, vector_space
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.forms import ElasticForms, is_sampled
@@ -47,6 +48,8 @@ class ElasticSpace:
     dofs. ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the
     conditions, ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
+
+    children = None  # the next space is on the same mesh: see ``CoarseSpace``
 
     @stage("spaces, forms")
     def __init__(self, body: BodyMesh, degree: int, conditions: Conditions, maps: StraightMaps | None = None):
@@ -113,12 +116,12 @@ class ElasticSpace:
     def lend(self, law: MaterialLaw, *, whole: bool = False, entries: bool = True) -> Iterator[PETSc.Mat]:
         """Lend K, which the borrower may change; collective.
 
-        With ``entries``, or in degree 1, it has type aij, with the first region's μ on the diagonal of prescribed dofs.
+        With ``entries`` it has type aij, with the first region's μ on the diagonal of prescribed dofs.
         With ``whole`` it has no conditions. Without entries it is matrix-free, with identity rows at prescribed dofs.
         """
         with ExitStack() as stack:
             terms = self._terms_at_rest(law, stack)
-            if entries or self.degree == 1:
+            if entries:
                 matrix = keep(stack, self._assemble(law, whole=whole))
                 self._add_terms(matrix, terms, whole=whole)
             else:
@@ -127,8 +130,27 @@ class ElasticSpace:
 
     @cached_property
     def cells(self) -> CellStiffness:
-        """The cells in the layout of products, made at first use; for degree 2 or more; collective."""
-        return CellStiffness(self.space, self._curved, self.prescribed, self.body.regions, self._maps, self.factors)
+        """The cells in the layout of products, made at first use; collective."""
+        # In degree 1, cells within which the stiffness varies are straight, too, unlike those of other degrees.
+        maps = None if self.degree == 1 and self.factors is not None else self._maps
+        return CellStiffness(self.space, self._curved, self.prescribed, self.body.regions, maps, self.factors)
+
+    @cached_property
+    def coarser(self) -> list[CoarseSpace]:
+        """The coarser spaces that are levels of multigrid below this one of degree 1, coarsest first; collective.
+
+        There are none if the mesh was not refined, nor if terms act on the body: their operators have cells alone.
+        """
+        found: list[CoarseSpace] = []
+        beyond, regions = self.body.beyond, self.body.regions
+        finer = None if self.terms or beyond is None else (self.space, self.prescribed, beyond, regions, self.factors)
+        while finer is not None and len(found) < self.body.refinements:
+            coarse = coarse_space(*finer)
+            if coarse is None:
+                break
+            found.insert(0, coarse)
+            finer = coarse.space, coarse.prescribed, coarse.beyond, coarse.regions, coarse.factors
+        return found
 
     @cached_property
     def _straight(self) -> StraightStiffness:

@@ -77,6 +77,12 @@ class Factors:
 
         return Factors(np.ones(1), True, np.zeros(1), np.zeros(1), np.ones((1, 4)), ones)
 
+    @staticmethod
+    def constant(means: FloatArray) -> "Factors":
+        """Return factors that are constant on each cell."""
+        none = np.zeros_like(means)
+        return Factors(means, False, none, none, np.tile(means[:, None], _CORNERS), lambda _: means[:, None])
+
     def in_cells(self, degree: int) -> FloatArray:
         """Return the factors at the quadrature points of a ``degree``; their means alone where they do not vary."""
         return self.at_points(degree) if self.varies else self.means[:, None]

@@ -171,7 +171,7 @@ class HeldOperator:
 
     def __init__(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool, masked: bool):
         """Assemble; collective. Matrices are freed with the ``stack``."""
-        matrix = stack.enter_context(space.lend(law, entries=direct))
+        matrix = stack.enter_context(space.lend(law, entries=direct or space.degree == 1))
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
         self.free, self._is_held, self._stack = matrix, False, stack
         if not masked and not is_product(matrix):

@@ -12,6 +12,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.solve.coarse_levels import CoarseSpace
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import Front
 from epsmesh.solve.contact_result import ContactResult
@@ -260,8 +261,10 @@ class Elements(ElementFields, ABC):
     def levels(self, law: MaterialLaw, stack: ExitStack, *, direct: bool) -> list[Level]:
         """Return the levels of multigrid, or the single one of a direct solve; the ``stack`` frees them."""
         degrees = [self.degree] if direct else range(1, self.degree + 1)
-        spaces = [self._spaces.get(degree, self._conditions) for degree in degrees]
-        return [level_of(space, law, stack, direct=direct) for space in spaces]
+        own = [self._spaces.get(degree, self._conditions) for degree in degrees]
+        coarser = [] if direct or self.degree == 1 else own[0].coarser
+        spaces: list[ElasticSpace | CoarseSpace] = [*coarser, *own]
+        return [level_of(space, law, stack, entries=direct or number == 0) for number, space in enumerate(spaces)]
 
     def elastic(self, law: MaterialLaw) -> MaterialLaw:
         """Return the law of the displacement block."""
@@ -349,7 +352,8 @@ def _copied(function: Any, factor: float = 1.0) -> Any:
     return found
 
 
-def level_of(space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool = False) -> Level:
-    """Return a multigrid level, or that of a direct solve; the ``stack`` frees its operator; collective."""
-    matrix = stack.enter_context(space.lend(law, entries=direct))
-    return Level(space.space, matrix, space.prescribed, not law.is_uniform or space.factors is not None)
+def level_of(space: ElasticSpace | CoarseSpace, law: MaterialLaw, stack: ExitStack, *, entries: bool = False) -> Level:
+    """Return a level of multigrid, matrix-free or with ``entries``; the ``stack`` frees its operator; collective."""
+    matrix = stack.enter_context(space.lend(law, entries=entries))
+    jumps = not law.is_uniform or space.factors is not None
+    return Level(space.space, matrix, space.prescribed, jumps, children=space.children)

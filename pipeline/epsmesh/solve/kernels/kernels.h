@@ -65,11 +65,11 @@ void subtract(int count, const float* q, float* r);
 double dot(int count, const float* x, const float* y);
 void find_places(int cells, int width, const int* dofs, int owned, int* cell, uint8_t* position);
 void prolong(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
-             const int* columns, const float* weights, const float* coarse_free, const float* fine_free,
-             const float* e, float* x);
+             const int* columns, const float* weights, const float* free, const float* e, float* x);
 void restrict_to(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
-                 const int* columns, const float* weights, int coarse_count, const float* coarse_free,
-                 const float* fine_free, const float* r, float* g);
+                 const int* columns, const float* weights, const float* free, const float* r, float* g);
+void prolong_on_edges(int rows, const int* ends, const float* free, const float* e, float* x);
+void restrict_from_edges(int rows, const int* ends, const float* free, const float* r, float* g);
 double largest(int count, const double* x);
 void to_single(int count, double scale, const double* x, float* y);
 void to_double(int count, double scale, const float* x, double* y);

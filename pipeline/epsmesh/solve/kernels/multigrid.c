@@ -1,7 +1,6 @@
 /* A multigrid cycle's loops in single precision. Vectors hold three numbers a point. */
 #include <math.h>
 #include <stddef.h>
-#include <string.h>
 #include <stdint.h>
 
 #include "kernels.h"
@@ -80,11 +79,10 @@ void find_places(int cells, int width, const int* dofs, int owned, int* cell, ui
     }
 }
 
-/* x += P e by points; prescribed numbers are neither read nor written. Row i of P has the weights of its position in a
+/* x += P e by points; fine numbers that are not free are not written. Row i of P has the weights of its position in a
  * fine cell, offsets[position[i]] and so on; columns are positions in the coarse cell, whose points are (cells, width). */
 void prolong(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
-             const int* columns, const float* weights, const float* coarse_free, const float* fine_free,
-             const float* e, float* x)
+             const int* columns, const float* weights, const float* free, const float* e, float* x)
 {
   for (int i = 0; i < rows; ++i)
   {
@@ -93,30 +91,28 @@ void prolong(int rows, const int* cell, const uint8_t* position, int width, cons
     for (int k = offsets[position[i]]; k < offsets[position[i] + 1]; ++k)
     {
       const size_t j = 3 * (size_t)at[columns[k]];
-      s0 += weights[k] * coarse_free[j] * e[j];
-      s1 += weights[k] * coarse_free[j + 1] * e[j + 1];
-      s2 += weights[k] * coarse_free[j + 2] * e[j + 2];
+      s0 += weights[k] * e[j];
+      s1 += weights[k] * e[j + 1];
+      s2 += weights[k] * e[j + 2];
     }
     const size_t here = 3 * (size_t)i;
-    x[here] += fine_free[here] * s0;
-    x[here + 1] += fine_free[here + 1] * s1;
-    x[here + 2] += fine_free[here + 2] * s2;
+    x[here] += free[here] * s0;
+    x[here + 1] += free[here + 1] * s1;
+    x[here + 2] += free[here + 2] * s2;
   }
 }
 
-/* g = P^T r */
+/* g += P^T r */
 void restrict_to(int rows, const int* cell, const uint8_t* position, int width, const int* points, const int* offsets,
-                 const int* columns, const float* weights, int coarse_count, const float* coarse_free,
-                 const float* fine_free, const float* r, float* g)
+                 const int* columns, const float* weights, const float* free, const float* r, float* g)
 {
-  memset(g, 0, (size_t)coarse_count * sizeof(float));
   for (int i = 0; i < rows; ++i)
   {
     const int* at = points + (size_t)width * cell[i];
     const size_t here = 3 * (size_t)i;
-    const float r0 = fine_free[here] * r[here];
-    const float r1 = fine_free[here + 1] * r[here + 1];
-    const float r2 = fine_free[here + 2] * r[here + 2];
+    const float r0 = free[here] * r[here];
+    const float r1 = free[here + 1] * r[here + 1];
+    const float r2 = free[here + 2] * r[here + 2];
     for (int k = offsets[position[i]]; k < offsets[position[i] + 1]; ++k)
     {
       const size_t j = 3 * (size_t)at[columns[k]];
@@ -125,8 +121,36 @@ void restrict_to(int rows, const int* cell, const uint8_t* position, int width, 
       g[j + 2] += weights[k] * r2;
     }
   }
-  for (int j = 0; j < coarse_count; ++j)
-    g[j] *= coarse_free[j];
+}
+
+/* The same where P is the mean of two ends, (rows, 2), or the identity where they are one. */
+void prolong_on_edges(int rows, const int* ends, const float* restrict free, const float* restrict e, float* restrict x)
+{
+  for (int i = 0; i < rows; ++i)
+  {
+    const float *a = e + 3 * (size_t)ends[2 * i], *b = e + 3 * (size_t)ends[2 * i + 1];
+    const size_t here = 3 * (size_t)i;
+    for (int c = 0; c < 3; ++c)
+      x[here + c] += free[here + c] * (0.5f * a[c] + 0.5f * b[c]);
+  }
+}
+
+void restrict_from_edges(int rows, const int* ends, const float* restrict free, const float* restrict r,
+                         float* restrict g)
+{
+  for (int i = 0; i < rows; ++i)
+  {
+    float *a = g + 3 * (size_t)ends[2 * i], *b = g + 3 * (size_t)ends[2 * i + 1];
+    const size_t here = 3 * (size_t)i;
+    const float weight = a == b ? 1.0f : 0.5f;
+    for (int c = 0; c < 3; ++c)
+    {
+      const float part = weight * (free[here + c] * r[here + c]);
+      a[c] += part;
+      if (a != b)
+        b[c] += part;
+    }
+  }
 }
 
 /* The largest magnitude of x. */

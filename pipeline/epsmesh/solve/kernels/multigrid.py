@@ -1,4 +1,4 @@
-"""Multigrid cycle over degrees p, …, 2 in single precision, above a coarse solver of degree 1 in double precision.
+"""Multigrid cycle over degrees and meshes in single precision, above a coarse solver of degree 1 in double precision.
 
 Prolongation is interpolation, restriction its transpose. The smoother is Chebyshev's iteration with the inverses of the
 diagonal blocks, as in PETSc; operators are matrix-free. The residual is scaled to magnitude 1 first, so that single
@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.mesh.curve import EDGES
 from epsmesh.solve.kernels.cells import Ghosts, summed
 from epsmesh.solve.kernels.native import Single, call
 from epsmesh.solve.kernels.product import CellOperator
@@ -34,18 +35,52 @@ _MANY, _LANCZOS_MANY = 500_000, 10
 # An eigenvalue above 1.1 times the estimate makes the cycle indefinite. A few slender elements may have one, with an
 # eigenvector that random vectors hardly contain; this many steps find it.
 _LANCZOS_CLOSER = 40
+# Corners of a cell at the ends of the edge of each of its points of degree 2; both are the corner at a corner.
+_ENDS = np.vstack([np.repeat(np.arange(4)[:, None], 2, axis=1), EDGES])
 # Prolongation weights below this are rounding.
 _NOTHING = 1e-12
 
 
 class Side(Protocol):
-    """A vector space and its prescribed local dofs (unrolled)."""
+    """A vector space and its prescribed local dofs (unrolled).
+
+    ``children`` (cells, 10) are the points of the next finer mesh in each cell: its corners, and those that halve its
+    edges; None if the next space is on the same mesh.
+    """
 
     @property
     def space(self) -> Any: ...  # noqa: D102
 
     @property
     def prescribed(self) -> npt.NDArray[Any]: ...  # noqa: D102
+
+    @property
+    def children(self) -> Int32Array | None: ...  # noqa: D102
+
+
+class Rows(Protocol):
+    """A prolongation P from local coarse points to owned fine ones, without conditions."""
+
+    def prolong(self, coarse: Single, free: Single, fine: Single) -> None:
+        """Add P ``coarse`` to ``fine`` where it is ``free`` (1, else 0)."""
+
+    def restrict(self, fine: Single, free: Single, coarse: Single) -> None:
+        """Add the transpose of P times ``fine``, where it is ``free``, to ``coarse``."""
+
+
+@dataclass(frozen=True)
+class OnEdges:
+    """Points that are in the middle of two coarse ones, their ``ends`` (n, 2), or on one, which is both ends."""
+
+    ends: Int32Array
+
+    def prolong(self, coarse: Single, free: Single, fine: Single) -> None:
+        """See :class:`Rows`."""
+        call("prolong_on_edges", len(self.ends), self.ends, free, coarse, fine)
+
+    def restrict(self, fine: Single, free: Single, coarse: Single) -> None:
+        """See :class:`Rows`."""
+        call("restrict_from_edges", len(self.ends), self.ends, free, fine, coarse)
 
 
 class Weights(NamedTuple):
@@ -57,36 +92,54 @@ class Weights(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Interpolation:
-    """Prolongation from the points of a coarse space to those of a fine one, equal for all components.
+class InCells:
+    """Points that have their row of ``weights`` by their ``position`` in one of their cells, ``cell``.
 
-    An owned fine point has its row of ``weights`` by its ``position`` in one of its cells, ``cell``; ``points`` (cells,
-    points of a cell) are the coarse points of all cells. ``coarse_free`` and ``fine_free`` are 0 at prescribed dofs,
-    else 1. ``ghosts`` are those of the coarse space. Both maps are collective.
+    ``points`` (cells, points of a cell) are the coarse points of all cells.
     """
 
     cell: Int32Array
     position: npt.NDArray[np.uint8]
     points: Int32Array
     weights: Weights
+
+    def prolong(self, coarse: Single, free: Single, fine: Single) -> None:
+        """See :class:`Rows`."""
+        call("prolong", *self._rows, free, coarse, fine)
+
+    def restrict(self, fine: Single, free: Single, coarse: Single) -> None:
+        """See :class:`Rows`."""
+        call("restrict_to", *self._rows, free, fine, coarse)
+
+    @property
+    def _rows(self) -> tuple[Any, ...]:
+        return len(self.cell), self.cell, self.position, self.points.shape[1], self.points, *self.weights
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """Prolongation from the points of a coarse space to those of a fine one, equal for all components.
+
+    ``coarse_free`` and ``fine_free`` are 0 at prescribed dofs, else 1. ``ghosts`` are those of the coarse space. Both
+    maps are collective.
+    """
+
+    rows: Rows
     coarse_free: Single
     fine_free: Single
     ghosts: Ghosts
 
     def prolong(self, coarse: Single, fine: Single) -> None:
         """Add the prolongation of ``coarse`` to ``fine``."""
-        values = self.ghosts.extended(coarse, 3)
-        call("prolong", *self._rows, self.coarse_free, self.fine_free, values, fine)
+        free = coarse * self.coarse_free[: len(coarse)]
+        self.rows.prolong(self.ghosts.extended(free, 3), self.fine_free, fine)
 
     def restrict(self, fine: Single, coarse: Single) -> None:
         """Write the restriction of ``fine``, the transposed prolongation, into ``coarse``."""
-        found = np.empty(len(self.coarse_free), dtype=np.float32)
-        call("restrict_to", *self._rows, len(found), self.coarse_free, self.fine_free, fine, found)
+        found = np.zeros(len(self.coarse_free), dtype=np.float32)
+        self.rows.restrict(fine, self.fine_free, found)
         coarse[:] = self.ghosts.folded(found, 3)
-
-    @property
-    def _rows(self) -> tuple[Any, ...]:
-        return len(self.cell), self.cell, self.position, self.points.shape[1], self.points, *self.weights
+        coarse *= self.coarse_free[: len(coarse)]
 
 
 class SmoothedLevel:
@@ -207,7 +260,7 @@ class Cycle:
     """The preconditioner: a context for PETSc's type "python"."""
 
     def __init__(self, levels: list[SmoothedLevel], interpolations: list[Interpolation], coarse: PETSc.PC):
-        """``levels`` go up from degree 2, ``interpolations`` lead to each; ``coarse`` is the solver of degree 1."""
+        """``levels`` go up from the second, ``interpolations`` lead to each; ``coarse`` is the solver of the first."""
         self._levels, self._interpolations, self.coarse = levels, interpolations, coarse
         bottom, _ = coarse.getOperators()
         self._comm = bottom.comm.tompi4py()
@@ -278,16 +331,15 @@ class Cycle:
 @stage("interpolation")
 def interpolation(coarse: Side, fine: Side) -> Interpolation:
     """Return the interpolation between two spaces; collective."""
-    cell, position = _places(fine.space)
-    return Interpolation(
-        cell=cell,
-        position=position,
-        points=compat.cell_dofs(coarse.space),
-        weights=_weights(compat.degree(coarse.space), compat.degree(fine.space)),
-        coarse_free=free(coarse),
-        fine_free=free(fine),
-        ghosts=Ghosts(coarse.space),
-    )
+    points, degree = compat.cell_dofs(fine.space), compat.degree(fine.space)
+    if coarse.children is not None:
+        points, degree = coarse.children, 2
+    cell, position = _places(fine.space.dofmap.index_map.size_local, points)
+    weights, below = _weights(compat.degree(coarse.space), degree), compat.cell_dofs(coarse.space)
+    rows: Rows = InCells(cell, position, below, weights)
+    if (compat.degree(coarse.space), degree) == (1, 2):
+        rows = OnEdges(below[cell[:, None], _ENDS[position]])
+    return Interpolation(rows, free(coarse), free(fine), Ghosts(coarse.space))
 
 
 def free(side: Side) -> Single:
@@ -298,12 +350,11 @@ def free(side: Side) -> Single:
     return mask
 
 
-def _places(space: Any) -> tuple[Int32Array, npt.NDArray[np.uint8]]:
-    """Return for each owned point one of its cells, and its position among the points of this cell.
+def _places(owned: int, dofs: Int32Array) -> tuple[Int32Array, npt.NDArray[np.uint8]]:
+    """Return for each ``owned`` point one of its cells, and its position among the points ``dofs`` of this cell.
 
     A point may belong to several cells; any of them gives the same weights.
     """
-    owned, dofs = space.dofmap.index_map.size_local, compat.cell_dofs(space)
     cell, position = np.zeros(owned, dtype=np.int32), np.zeros(owned, dtype=np.uint8)
     call("find_places", *dofs.shape, dofs, owned, cell, position)
     return cell, position

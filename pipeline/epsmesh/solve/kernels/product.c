@@ -164,7 +164,10 @@ void NAME(int degree, int batches, const int* dofs, const TYPE* maps, const TYPE
           const int* column, const TYPE* weight, const int* first_back, const int* column_back,                        \
           const TYPE* weight_back, const int* raised, const TYPE* mass, const TYPE* x, TYPE* y)                        \
 {                                                                                                                      \
-  if (degree == 2) /* loops of constant length are unrolled */                                                         \
+  if (degree == 1) /* loops of constant length are unrolled */                                                         \
+    of_degree(NAME)(4, 1, batches, dofs, maps, lame, first, column, weight, first_back, column_back, weight_back,      \
+                    raised, mass, x, y);                                                                               \
+  else if (degree == 2)                                                                                                \
     of_degree(NAME)(10, 4, batches, dofs, maps, lame, first, column, weight, first_back, column_back, weight_back,     \
                     raised, mass, x, y);                                                                               \
   else if (degree == 3)                                                                                                \
