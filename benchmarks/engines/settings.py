@@ -32,10 +32,21 @@ SCANS = MappingProxyType(
             *grid(size=[COARSE], solref=["0.01 1"], heavier=[100], damping=[0.0, 0.01]),
             *grid(size=[COARSE], solref=["0.002 1"], heavier=[1, 100], damping=[0.0, 0.01]),
             *grid(
-                size=[COARSE, 4e-3], solref=["0.002 1"], solimp=[".99 .9999 .0001"], heavier=[10, 1000], damping=[0.01]
+                size=[COARSE, 4e-3, FINE],
+                solref=["0.002 1"],
+                solimp=[".99 .9999 .0001"],
+                heavier=[10, 1000],
+                damping=[0.01],
             ),
         ),
-        "Newton VBD": grid(size=[COARSE], stiffness=[1e3], full=[False]),
+        "Newton VBD": (
+            *grid(size=[COARSE], stiffness=[1e3, 1e4], iterations=[10, 50]),
+            *grid(size=[COARSE], stiffness=[1e4], iterations=[50], damping=[0.0, 100.0]),
+            *grid(size=[COARSE], stiffness=[1e4], iterations=[10], tick=[1 / 2400]),
+            *grid(size=[FINE], stiffness=[1e2, 1e3, 1e4], iterations=[10]),
+            *grid(size=[FINE], stiffness=[1e3, 1e4], iterations=[50]),
+            *grid(size=[FINE], stiffness=[1e3], iterations=[10], tick=[1 / 2400]),
+        ),
         "PyBullet": (
             *grid(size=[COARSE], tick=[1e-3], scale=[10.0, 100.0], margin=[1e-4, 1e-5]),
             *grid(size=[COARSE], tick=[1 / 240], scale=[10.0], margin=[1e-5]),
