@@ -45,7 +45,7 @@ MPI_ENV := OMP_NUM_THREADS=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CON
 # Debian's mpirun: another one on PATH does not match Debian's mpi4py.
 MPIRUN = $(MPI_ENV) /usr/bin/mpirun --oversubscribe -n
 
-.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers engines plain-loop realtime wasm vendored stress extremes coverage refit pairs same fuzz soak faults mutants lint format clean
+.PHONY: help setup study studies docs test test-all test-debian13 debian docker-steps release wheel-road slurm-test verify benchmark peers engines hosts plain-loop realtime wasm vendored stress extremes coverage refit pairs same fuzz soak faults mutants lint format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -133,6 +133,11 @@ peers: setup ## compare with NGSolve, scikit-fem and CalculiX the time for a tru
 engines: setup ## compare the force on a ball in a pad with those of MuJoCo, Newton and PyBullet (an hour): results/engines.md
 	@scripts/engines.sh
 	$(PYTHON) -m benchmarks.engines $(ENGINES_ARGS)
+
+hosts: setup ## test the functions for PyTorch and JAX, and the examples for MuJoCo and Newton, in a venv of their own
+	@scripts/engines.sh
+	PYTHONPATH=.:pipeline .venv-engines/bin/python -m pytest --noconftest -m "" \
+		$(foreach host,of_torch of_jax mujoco newton,tests/realtime/test_$(host).py) $(PYTEST_ARGS)
 
 plain-loop: setup ## compare a plain FEniCSx script of a study with this program (on an idle machine, an hour or two)
 	$(PYTHON) -m benchmarks.plain_loop $(STUDY) $(LOOP_ARGS)

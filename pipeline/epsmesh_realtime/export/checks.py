@@ -13,6 +13,7 @@ from epsmesh.stages import stage
 from epsmesh_realtime.export.forecast import DEPTH, SIZES
 from epsmesh_realtime.export.full import Full, Solver, Tool
 from epsmesh_realtime.export.ranks import ALONE, Ranks
+from epsmesh_realtime.export.setting import place_of
 from epsmesh_realtime.model import Model
 
 # Least factor on the parts of a bar that grow with the tool: few touches are of the largest.
@@ -111,8 +112,8 @@ def random_touch(model: Model, rng: np.random.Generator, kind: int) -> Check:
     if TOOLS[kind] == "blade":
         slenderness, angle = float(np.exp(rng.uniform(*np.log(_SLENDER)))), rng.uniform(0, 2 * np.pi)
         width = 2 * size / float(np.hypot(slenderness, 1))
-        along = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
-        tool = Tool("blade", length=slenderness * width, width=width, along=along)
+        first, second, third = (np.array([np.cos(angle), np.sin(angle), 0.0]) @ model.axes).tolist()
+        tool = Tool("blade", length=slenderness * width, width=width, along=(first, second, third))
     return with_bar(model, Check(x, y, size, depth, poisson, nan, nan, nan, nan, kind, tool))
 
 
@@ -127,7 +128,7 @@ def solved(model: Model, solver: Solver, asked: Check, poissons: Sequence[float]
     # A bonded tool is held along its own plane: on facets, whose normals differ, that is the model's.
     is_turned = asked.tool.contact == "bonded" and not model.face.is_flat
     tool = replace(asked.tool, axis=(x, y, z)) if is_turned else asked.tool
-    fulls = solver.press_all(tool, (float(at[0]), float(at[1])), [asked.depth], poissons)
+    fulls = solver.press_all(tool, place_of(model.axes, at), [asked.depth], poissons)
     return [
         with_full(model, replace(asked, poisson=poisson), full)
         for poisson, full in zip(poissons or [asked.poisson], fulls, strict=True)

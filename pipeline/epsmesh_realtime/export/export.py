@@ -132,7 +132,9 @@ def export(
     except ExportError as reason:
         unseen = str(reason)
     else:
-        seen = replace(tabulate_surface(far, model.origin), inside=inclusions(scope.body, model)) if surface else None
+        if surface:
+            table = tabulate_surface(far, model.axes @ model.origin)
+            seen = replace(table, inside=inclusions(scope.body, model))
         model = replace(model, pairs=tabulate_pairs(far))
     return Exported(model, fitted, judged, error, places, seen, unseen)
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field, replace
 from math import exp, log
 
+import numpy as np
+
 from epsmesh.plan import estimate
 from epsmesh.plan.cost import CostModel
 from epsmesh.printable import counted
@@ -13,6 +15,7 @@ from epsmesh_realtime.export.full import Solver, Tool
 from epsmesh_realtime.export.kept import NONE, Kept
 from epsmesh_realtime.export.region import MARGIN, Region, coarse_case, curved_region, surface_case
 from epsmesh_realtime.export.scope import Scope
+from epsmesh_realtime.export.setting import Setting, place_of
 from epsmesh_realtime.export.tabulate import counts, ratios_of
 
 # Largest contact, in units of the distance to the nearest side or the bottom; number of full solves; accuracy.
@@ -157,10 +160,13 @@ class Export:
             solves, seconds = solves + count, seconds + time
         return Forecast(solves * least, solves * most, seconds * least, seconds * most)
 
-    def _at(self, region: Region) -> tuple[float, float]:
+    def _at(self, region: Region) -> tuple[float, ...]:
         """Return a typical place."""
-        x, y = (0.0, 0.0) if self.scope.is_flat else self.scope.case.probe.at[:2]
-        return x + _PLACE[0] * region.reach[0], y + _PLACE[1] * region.reach[1]
+        x, y = _PLACE[0] * region.reach[0], _PLACE[1] * region.reach[1]
+        if self.scope.is_flat:
+            return x, y
+        setting = Setting.of(self.scope.case)
+        return place_of(setting.axes, setting.origin + np.array([x, y, 0.0]) @ setting.axes)
 
     def _size(self, region: Region) -> float:
         """Return the half size (m) of a typical tool."""
@@ -170,7 +176,8 @@ class Export:
     def _check_seconds(self, region: Region) -> float:
         size, scope = self._size(region), self.scope
         width = 2 * size / (1 + _SLENDER**2) ** 0.5
-        tools = [Tool("disc", size), Tool("blade", length=_SLENDER * width, width=width)]
+        x, y, z = (1.0, 0.0, 0.0) if scope.is_flat else Setting.of(scope.case).axes[0].tolist()
+        tools = [Tool("disc", size), Tool("blade", length=_SLENDER * width, width=width, along=(x, y, z))]
         tools += [Tool("disc", size, contact="bonded")]
         several = scope.poissons[0] < scope.poissons[1]
         seconds = [

@@ -95,7 +95,8 @@ def surface_case(case: Case, region: Region) -> Case:
 
 def is_free(scope: Scope) -> bool:
     """Return whether the region of a curved body has the size of the tool, not that of the body."""
-    return not scope.body.half_sides or any(scope.case.probe.at[:2]) or bool(scope.body.embedded)
+    at = scope.case.probe.at
+    return not scope.body.half_sides or len(at) > len("xy") or any(at) or bool(scope.body.embedded)
 
 
 def curved_region(scope: Scope, room: float, half: float) -> Region:

@@ -1,12 +1,15 @@
 """Which studies a real-time model supports, and the case and range that it covers."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.facetted import Facetted
+from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.registry import PROBES
 from epsmesh.shapes.support import Faces
 from epsmesh.shapes.tissue import Tissue
@@ -30,7 +33,10 @@ class ExportError(Exception):
 
 @dataclass(frozen=True)
 class Scope:
-    """A case with its body, defaults of E and ν, the range of ν, and the ``sections`` of its ``file``."""
+    """A case with its body, defaults of E and ν, the range of ν, and the ``sections`` of its ``file``.
+
+    Of a curved body, ``places`` (m) are all points of the study that a tool touches; the case has the middle one.
+    """
 
     case: Case
     body: Body
@@ -39,6 +45,7 @@ class Scope:
     poissons: tuple[float, float]
     sections: Mapping[str, Any]
     file: str
+    places: tuple[Vector, ...] = ()
 
     @property
     def relaxation(self) -> Terms:
@@ -104,7 +111,16 @@ def scope_of(study: Study) -> Scope:
     wanted = [*_USUAL, *ratios] if is_simple else ratios
     poissons = min(wanted), max(wanted)
     sections = tomllib.loads(study.text) if study.text else {}
-    return Scope(first, first.body, tissue.young, tissue.poisson, poissons, sections, study.file)
+    middle, places = (first, ()) if isinstance(first.body, Layered) else _middle_of(cases)
+    return Scope(middle, first.body, tissue.young, tissue.poisson, poissons, sections, study.file, places)
+
+
+def _middle_of(cases: Sequence[Case]) -> tuple[Case, tuple[Vector, ...]]:
+    """Return the first case at the place nearest to the mean of all places that a tool touches, and these places."""
+    touching = [case for case in cases if not case.no_contact]
+    places = np.array([case.frame.point for case in touching])
+    nearest = touching[int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmin())]
+    return replace(cases[0], probe=nearest.probe), tuple(dict.fromkeys(case.frame.point for case in touching))
 
 
 def surface_tissue(case: Case) -> Tissue:
@@ -144,9 +160,7 @@ def _refusal(case: Case, first: Case) -> str:
             'probe: a curved body needs shape = "disc" and contact = "frictionless"; its radius sets the model\'s '
             "largest tool, 1.5 times as large"
         )
-    if len(probe.at) != len("xy") or probe.axis is not None:
-        return "probe.at must be x and y, the middle of the model's region; leave probe.axis out"
-    return ""
+    return "" if probe.axis is None else "probe.axis: tools of a real-time model press along the normal: leave it out"
 
 
 def _relaxing_refusal(case: Case, first: Case) -> str:

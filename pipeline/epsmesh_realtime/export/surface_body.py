@@ -1,5 +1,6 @@
 """The meshed body of a model, with the point forces for which its deforming surface is tabulated."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -7,6 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from epsmesh.arrays import FloatArray
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.run.loads import terms_of
@@ -35,7 +37,7 @@ _POINTS = 500
 
 
 def surface_body(scope: Scope, model: Model, margin: float, ranks: Ranks = ALONE) -> LoadedBody:
-    """Return the body of a model, with the forces on its face; collective.
+    """Return the body of a model, along the model's axes, with the forces on its face; collective.
 
     Raises:
         ExportError: if part of it is above its own region.
@@ -75,14 +77,15 @@ def inclusions(body: Body, model: Model) -> tuple[NDArray[np.float32], NDArray[n
 def _curved(scope: Scope, model: Model, ranks: Ranks) -> LoadedBody:
     radius = scope.case.probe.circumradius
     region = curved_region(scope, model.thickness, model.table.reach[0])
+    origin = model.axes @ model.origin
 
     def on_face(place: tuple[float, float], poisson: float) -> PlacedForce:
         spot = model.spot(*place)
-        x, y, z = np.add(model.origin, [*place, spot.height]).tolist()
+        x, y, z = np.add(origin, [*place, spot.height]).tolist()
         first, second, third = ((float(a), float(b), float(c)) for a, b, c in spot.turn)
         return PlacedForce(poisson, (x, y, z), region.room(*place), (first, second, third), _BLUNT * radius)
 
-    mesh = _mesh(scope, region, ranks)
+    mesh = _mesh(scope, region, model.axes, ranks)
     points = np.asarray(mesh.mesh.geometry.x)
     corners = [(x * region.reach[0], y * region.reach[1]) for x in (-0.7, 0.0, 0.7) for y in (-0.7, 0.0, 0.7)]
     if max(on_face(place, scope.poisson).above(points) for place in corners) > _STRAIGHT_ABOVE:
@@ -91,5 +94,7 @@ def _curved(scope: Scope, model: Model, ranks: Ranks) -> LoadedBody:
     return LoadedBody(mesh, region, on_face, law, _NEXT * radius, model.off, _DOUBT, ranks, terms)
 
 
-def _mesh(scope: Scope, region: Region, ranks: Ranks) -> BodyMesh:
-    return distribute(MPI.COMM_SELF, ranks.on_first(lambda: mesh_arrays(surface_case(scope.case, region), ())))
+def _mesh(scope: Scope, region: Region, axes: FloatArray, ranks: Ranks) -> BodyMesh:
+    """Return the mesh with its points along the model's ``axes``."""
+    arrays = ranks.on_first(lambda: mesh_arrays(surface_case(scope.case, region), ()))
+    return distribute(MPI.COMM_SELF, replace(arrays, points=arrays.points @ axes.T))
