@@ -256,6 +256,14 @@ def _support(study: Study) -> None:
     study["probe"].setdefault("contact", "unilateral")
 
 
+def _grasp(study: Study) -> None:
+    """Let an equal jaw close on the body from the opposite side; its sides hold it, or nothing else."""
+    is_round = study["body"]["shape"] in ("box", "cylinder")
+    study["body"]["fixed"] = "sides" if is_round else study["body"].get("fixed", "none")
+    study["probe"].setdefault("contact", "unilateral")
+    study["probe"] = [study["probe"] | {"together": "grasp"}, {"together": "grasp"}]
+
+
 _DRAW = """
 import sys, gmsh
 gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
@@ -341,6 +349,8 @@ FEATURES = (
     Feature("influence", "influence", _update("solve", influence=True)),
     # A spread asks for the influence: the two are one feature.
     Feature("spread", "influence", _update("material", spread={"young": "30 %", "correlation_length": "5 mm"})),
+    # The last one: from here on, a study has two tools.
+    Feature("grasp", "grasp", _grasp),
 )  # fmt: skip
 
 

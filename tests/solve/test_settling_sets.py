@@ -8,7 +8,8 @@ import pytest
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.deformed import PlacedTool, solve_contact
+from epsmesh.solve.contact.deformed import solve_contact
+from epsmesh.solve.contact.touching import PlacedTool
 from epsmesh.solve.newton import LargeError
 
 COUNT = 9

@@ -8,7 +8,7 @@ from math import acos, cos, log, pi, sin, sqrt, tan
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.special import ellipk
+from scipy.special import ellipk, gamma, jv
 
 from epsmesh.arrays import FloatArray
 
@@ -58,6 +58,7 @@ DIMITRIADIS = "E. K. Dimitriadis et al., Biophys. J. 82, 2798 (2002)"
 CIAVARELLA = "M. Ciavarella, Int. J. Solids Struct. 36, 4149 (1999)"
 BILODEAU = "G. G. Bilodeau, J. Appl. Mech. 59, 519 (1992)"
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
+KEER = "L. M. Keer, J. Dundurs and K. C. Tsai, J. Appl. Mech. 39, 1115 (1972): integral equation, solved anew"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).
@@ -227,3 +228,32 @@ def flat_punch(toughness: float) -> tuple[float, float]:
 
     found = minimize_scalar(pressure, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-9})
     return sqrt(found.x), float(found.fun)
+
+
+def receding_radius() -> float:
+    """Return the radius of contact, over its thickness, of a layer pressed on a rigid smooth plane by a point force.
+
+    With q and p the Hankel transforms of the pressures on top and bottom, the bottom's deflection is that of a free
+    layer: ((q - p) A - (q + p) S) / 2, with A and S those of opposite and equal pressures on both faces. It is constant
+    where the bottom touches. p is a sum of (1 - r²/a²)^(j + 1/2), zero at the edge a.
+    """
+    share = (np.arange(8000) + 0.5) / 8000
+    wave, weight = 100 * share**2, 200 * share / 8000
+    bounded = np.minimum(wave, 40.0)
+    opposite = (np.cosh(bounded) + 1) / (np.sinh(bounded) - bounded) / wave
+    equal = (np.cosh(bounded) - 1) / (np.sinh(bounded) + bounded) / wave
+
+    def pressure(order: int, a: float) -> FloatArray:
+        power = order + 0.5
+        return np.asarray(2 ** (power + 1) * gamma(power + 2) * jv(power + 1, a * wave) / (a * wave) ** (power + 1))
+
+    def uneven(a: float) -> float:
+        radii = a * np.sin(np.linspace(0.02, 0.98 * np.pi / 2, 30))
+        waves = np.array([jv(0, wave * r) - np.exp(-(wave**2)) for r in radii])  # but for a constant
+        own = [pressure(order, a) for order in range(6)]
+        columns = np.array([waves @ ((opposite * (1 - p) - equal * (1 + p)) / 2 * wave * weight) for p in own]).T
+        system = np.column_stack([columns[:, 1:] - columns[:, :1], np.ones(len(radii))])
+        shares = np.linalg.lstsq(system, -columns[:, 0], rcond=1e-13)[0]
+        return float(np.linalg.norm(system @ shares + columns[:, 0]))
+
+    return float(minimize_scalar(uneven, bounds=(0.9, 1.4), method="bounded").x)

@@ -10,6 +10,7 @@ from tests.verification.bodies import body_rows
 from tests.verification.capsules import capsule_rows
 from tests.verification.compliance import compliance_rows
 from tests.verification.contact import contact_rows
+from tests.verification.contacts import contacts_rows
 from tests.verification.elements import element_rows
 from tests.verification.far_fields import far_field_rows
 from tests.verification.forces import scene_rows
@@ -27,7 +28,7 @@ from tests.verification.wedges import wedge_rows
 _OF_SCENES = (
     scene_rows, region_rows, body_rows, contact_rows, wedge_rows, slit_rows, insertion_rows, needle_rows,
     far_field_rows, path_rows, load_rows, hyperelastic_rows, relaxation_rows, layer_rows, capsule_rows,
-    compliance_rows,
+    compliance_rows, contacts_rows,
 )  # fmt: skip
 
 

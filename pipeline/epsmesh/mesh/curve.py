@@ -12,8 +12,10 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.mesh.generate import MeshArrays, MeshError
-from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE, Scene
+from epsmesh.scene.model import FIXED, FREE, JAW, MIRROR, PROBE, Scene
+from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.ovoid import Ovoid
+from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.scanned import Scanned
 from epsmesh.shapes.surface import Surface
 from epsmesh.shapes.triangles import edge_keys
@@ -62,7 +64,7 @@ def curve(mesh: MeshArrays, scene: Scene, *, is_finest: bool = True, agree: Agre
     middle = curved.copy()
     if is_finest:
         if scene.has_quarter_points:
-            middle = _quarter_points(mesh, edges, middle)
+            middle = _quarter_points(_singular_rim(mesh, scene), mesh.points, edges, middle)
         # A folded cell loses its quarter points first: without its arcs the footprint would be smaller.
         for milder in (curved, straight):
             _unfold(mesh.points[corners], middle, of_cell, milder, partial(agree, edges))
@@ -101,7 +103,12 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
         if mesh.bent is not None:
             return middle
         return _on_lifted_rim(mesh, scene, edges, middle)
-    both = np.isin(edges, mesh.rim).all(axis=1) & np.isin(_key(mesh, edges), _facet_edges(mesh, ["probe"]))
+    on_rim = np.isin(edges, mesh.rim).all(axis=1)
+    if scene.jaw is not None and scene.jaw.is_curved:
+        chosen, frame = on_rim & np.isin(_key(mesh, edges), _facet_edges(mesh, [JAW])), scene.jaw.frame_on(scene.body)
+        middle = middle.copy()
+        middle[chosen] = _at_edge(scene.jaw, frame, middle[chosen])
+    both = on_rim & np.isin(_key(mesh, edges), _facet_edges(mesh, [PROBE]))
     if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
         return middle
     beyond = np.zeros(len(mesh.points), dtype=bool)
@@ -111,13 +118,19 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
     middle = middle.copy()
     middle[of_column] = scene.cut_face.project(middle[of_column])
     chosen = both & ~of_column
-    local = scene.frame.local(middle[chosen])
-    local[:, :2] = scene.probe.to_edge(local[:, :2])
     if isinstance(scene.body, Scanned):
-        middle[chosen], _ = scene.body.lift(scene.frame, local[:, :2])
+        local = scene.probe.to_edge(scene.frame.local(middle[chosen])[:, :2])
+        middle[chosen], _ = scene.body.lift(scene.frame, local)
         return middle
-    middle[chosen] = scene.frame.world(local)
+    middle[chosen] = _at_edge(scene.probe, scene.frame, middle[chosen])
     return middle
+
+
+def _at_edge(probe: Probe, frame: Frame, points: FloatArray) -> FloatArray:
+    """Return the nearest points (n, 3) of the edge of a plane footprint to ``points`` (n, 3) near it, in m."""
+    local = frame.local(points)
+    local[:, :2] = probe.to_edge(local[:, :2])
+    return frame.world(local)
 
 
 def _is_lifted(scene: Scene) -> bool:
@@ -221,12 +234,20 @@ def _facet_edges(mesh: MeshArrays, names: object) -> IntArray:
     return np.unique(edge_keys(facets, len(mesh.points)))
 
 
-def _quarter_points(mesh: MeshArrays, edges: IntArray, middle: FloatArray) -> FloatArray:
-    """Move the mid node of every edge with exactly one end on the rim to a quarter of its length from there."""
-    ends = np.isin(edges, mesh.rim)
+def _singular_rim(mesh: MeshArrays, scene: Scene) -> IntArray:
+    """Return the points of the rim at which the displacement goes like r^½: of a second jaw it may, or not."""
+    if scene.jaw is None:
+        return mesh.rim
+    within = [mesh.facets[name].ravel() for name, (tool, _) in scene.tools.items() if tool.has_singular_edge]
+    return np.intersect1d(mesh.rim, np.concatenate(within))
+
+
+def _quarter_points(rim: IntArray, points: FloatArray, edges: IntArray, middle: FloatArray) -> FloatArray:
+    """Move the mid node of every edge with exactly one end on the ``rim`` to a quarter of its length from there."""
+    ends = np.isin(edges, rim)
     for here in (0, 1):
         chosen = ends[:, here] & ~ends[:, 1 - here]
-        start, end = mesh.points[edges[chosen, here]], mesh.points[edges[chosen, 1 - here]]
+        start, end = points[edges[chosen, here]], points[edges[chosen, 1 - here]]
         # A curved edge keeps its bulge, which at a quarter of the length is 3/4 of that in the middle.
         bulge = middle[chosen] - (start + end) / 2
         middle[chosen] = start + (end - start) / 4 + 0.75 * bulge

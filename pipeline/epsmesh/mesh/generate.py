@@ -17,9 +17,10 @@ from epsmesh.mesh.model_arrays import corners_of, numbered_points, points_by_tag
 from epsmesh.mesh.reason import reason
 from epsmesh.mesh.regions import LocalSizes, longest_at_rim, region_sizes
 from epsmesh.mesh.size import Sizes, set_size_field
-from epsmesh.scene.model import CUT, FIXED, FREE, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build
+from epsmesh.scene.model import CUT, FIXED, FREE, JAW, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build, rims
 from epsmesh.shapes.bodies.cad import FromCad
 from epsmesh.shapes.body import Drawn
+from epsmesh.shapes.probe import Probe
 from epsmesh.stages import stage
 
 # gmsh's HXT is 3 to 6 times faster, but numbers its points by memory address: no two runs give the same mesh, not even
@@ -131,6 +132,9 @@ def in_model(
             local, unit = region_sizes(scene, sizes.growth, sizes.largest), 1 / scene.scale
             more = [term for part in local for term in part.terms(unit, gmsh.model.geo)]
             more += rounded_sizes(scene, sizes.growth)
+            if scene.jaw is not None:
+                more += _at_jaw(scene, scene.jaw, sizes)
+                rim_curves = [*rim_curves, *rims(scene)[JAW]]
             lifted = [] if scene.is_flat else rim_curves
             last = set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             if scene.body.region:
@@ -144,6 +148,14 @@ def in_model(
         taken = take(rim_curves, local)
         _clear(last)
         return taken
+
+
+def _at_jaw(scene: Scene, jaw: Probe, sizes: Sizes) -> list[str]:
+    """Set the number of edges along the rim of a ``jaw``; return the element sizes around it, as texts for gmsh."""
+    frame, unit, curves = jaw.frame_on(scene.body), 1 / scene.scale, rims(scene)[JAW]
+    if scene.jaw_segments and len(curves) == 1:
+        gmsh.model.mesh.setTransfiniteCurve(curves[0], scene.jaw_segments // 2 ** len(scene.mirrors) + 1)
+    return sizes.of_jaw.terms(frame.point, jaw.rim_distance(*frame.expressions(unit), unit), unit)
 
 
 def _clear(last: int) -> None:
@@ -224,7 +236,7 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = position[corners_of(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group))]
-    assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, *MIRROR.values()}
+    assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, JAW, *MIRROR.values()}
     if not rim_curves:
         why = "gmsh leaves out the edge of the contact, which is too small beside the body: use a larger depth"
         raise GeometryError(why)

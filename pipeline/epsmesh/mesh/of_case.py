@@ -119,8 +119,12 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
         sizes = replace(sizes, times=times, rim=at_rim * sizes.rim, column=column / times)
     segments = sizes.rim_segments(case.expected)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
-    folds = not case.has_quarter_points
-    return Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds), sizes
+    folds, jaw = not case.has_quarter_points, case.jaw
+    scene = Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds)
+    if jaw is None:
+        return scene, sizes
+    sizes = replace(sizes, jaw_rim=case.mesh.rim_size(jaw.half_width))
+    return replace(scene, jaw=jaw, jaw_segments=sizes.of_jaw.rim_segments(jaw)), sizes
 
 
 def _beyond(case: Case, mirrors: tuple[str, ...]) -> tuple[str, ...]:

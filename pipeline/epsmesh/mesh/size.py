@@ -1,7 +1,7 @@
 """Size field: fine within ε of the contact, growing to coarse, and refined towards the probe's edge."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, inf
 
 import gmsh
@@ -29,7 +29,7 @@ class Sizes:
 
     ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``. A round side,
     with ``column`` its radius, is resolved over its whole length, also beyond ``epsilon``. All elements, those of
-    regions included, are ``times`` as large.
+    regions included, are ``times`` as large. ``jaw_rim`` is the size at the edge of a second jaw.
     """
 
     epsilon: float
@@ -39,6 +39,12 @@ class Sizes:
     growth: float
     column: float = inf
     times: float = 1.0
+    jaw_rim: float = inf
+
+    @property
+    def of_jaw(self) -> "Sizes":
+        """The sizes around a second jaw."""
+        return replace(self, rim=self.jaw_rim)
 
     @property
     def largest(self) -> float:

@@ -78,6 +78,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
+    tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), case.probe.half_width
@@ -122,6 +123,7 @@ def mesh_key(case: Case) -> str:
     footprint = text_of(case.probe, case.probe.not_drawn)
     refined = [f"refined {times}"] if (times := refinements(case)) else []
     parts = [_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined, *_rim_text(case)]
+    parts += [f"jaw {text_of(jaw, jaw.not_drawn)}"] if (jaw := case.jaw) else []
     return digest("\n".join(parts))
 
 
@@ -138,6 +140,7 @@ def operator_key(case: Case) -> str:
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
+    rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
     return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *rests, *fields, *shape])
 

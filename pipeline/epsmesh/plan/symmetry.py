@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from epsmesh.shapes.body import Body
+from epsmesh.shapes.grasp import opposite
 from epsmesh.shapes.probe import PLANES, Probe
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.capabilities.obstacles import obstacle
@@ -109,7 +110,8 @@ def _geometry(body: Body, probe: Probe) -> tuple[str, ...]:
         upright = frame.point[number] == frame.axis[number] == 0.0
         if plane in held and upright and probe.is_mirrored(along, across):
             found.append(plane)
-    return tuple(found)
+    jaw = opposite(body, probe)
+    return tuple(found) if jaw is None else tuple(plane for plane in found if plane in _geometry(body, jaw))
 
 
 @lru_cache(_MANY)

@@ -66,7 +66,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy=solution.energy,
         energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
-        largest=solution.largest | of_rest(solution.contact, solution.reaction_bars),
+        largest=solution.largest | (_of_jaw(case, solution.contact) if case.jaw else of_rest(solution)),
         **_of_contact(solution.contact, has_history=solution.history is not None),
         **_of_loads(case, solution),
         balance=solution.balance,
@@ -132,15 +132,34 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
     return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
 
 
-def of_rest(contact: ContactResult | None, bars: Vector) -> dict[str, float]:
-    """Return what a record has of a support that lets go, by the names in the dataset; ``bars`` (N) are those of F.
-
-    Its force differs from that of the tool by the weight of the body, and has the same error.
-    """
+def _of_jaw(case: Case, contact: ContactResult | None) -> dict[str, float]:
+    """Return what a record has of a second jaw, by the names in the dataset: forces are those of the tissue on it."""
     if contact is None or contact.rest is None:
         return {}
     rest = contact.rest
-    across = zip(rest.normal, rest.force, bars, strict=True)
+    force = sum(n * f for n, f in zip(rest.normal, rest.force, strict=True))
+    vector = turned_back(case.frame.turn, (0.0 - rest.force[0], 0.0 - rest.force[1], 0.0 - rest.force[2]))
+    return {
+        "jaw_force": force,
+        "jaw_force_error": rest.force_bar * abs(force),
+        "jaw_contact_area": rest.area,
+        "jaw_contact_area_error": rest.bar * rest.area,
+        "jaw_torque": rest.torque,
+        "jaw_torque_error": rest.torque_bar,
+        **{f"jaw_force_vector_{axis}": part for axis, part in zip("xyz", vector, strict=True)},
+    }
+
+
+def of_rest(solution: Solution) -> dict[str, float]:
+    """Return what a record has of a support that lets go, by the names in the dataset.
+
+    Its force differs from that of the tool by the weight of the body, and has the same error.
+    """
+    contact = solution.contact
+    if contact is None or contact.rest is None:
+        return {}
+    rest = contact.rest
+    across = zip(rest.normal, rest.force, solution.reaction_bars, strict=True)
     parts = [(n * f, abs(n) * bar) for n, f, bar in across if abs(n) > _ROUNDING]
     return {
         "support_force": sum(force for force, _ in parts),
@@ -218,8 +237,9 @@ def least_bar(solve: Solve) -> float:
 
 
 def size_at_contact(case: Case) -> float:
-    """Return the size of elements at the edge of contact, in units of its expected half width."""
-    return case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
+    """Return the size of elements at the edge of contact, in units of its expected half width; of jaws, the larger."""
+    size = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
+    return size if case.jaw is None else max(size, case.mesh.rim_size(case.jaw.half_width) / case.jaw.contact_width)
 
 
 def _rim(case: Case) -> float:

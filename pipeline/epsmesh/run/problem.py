@@ -15,6 +15,7 @@ from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import half_plane_fields, variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
+from epsmesh.scene.model import FIXED, JAW
 from epsmesh.shapes.contact import first_touch, normal_at_touch
 from epsmesh.shapes.distance import Distance
 from epsmesh.shapes.frame import Frame, Vector
@@ -133,7 +134,7 @@ def conditions_of(case: Case) -> Conditions:
         tip=tip,
         terms=terms_of(case),
         variation=variation_of(case),
-        released=case.body.resting is not None,
+        beds=beds_on(case),
     )
 
 
@@ -144,15 +145,36 @@ def tool_of(case: Case) -> Tool:
     return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
 
 
+def beds_on(case: Case) -> tuple[str, ...]:
+    """Return the groups of facets that contacts besides the tool's may touch, in the order of :func:`beds_of`."""
+    return ((FIXED,) if case.body.resting else ()) + ((JAW,) if case.jaw else ())
+
+
 def beds_of(case: Case) -> tuple[Bed, ...]:
-    """Return the plane on which the body of ``case`` rests, for the same mesh; nothing if its support is fixed."""
+    """Return what touches the body of ``case`` besides the tool, for the same mesh: its support, or a second jaw."""
     resting, turn = case.body.resting, case.frame.turn
-    if resting is None:
-        return ()
-    low, _ = case.body.heights
-    turned = np.eye(3) if turn is None else turn
-    x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
-    return (Bed(plane(turned @ np.array([0.0, 0.0, low]), np.array([x, y, z])), (x, y, z), resting.friction > 0),)
+    turned, found = np.eye(3) if turn is None else turn, list[Bed]()
+    if resting is not None:
+        low, _ = case.body.heights
+        x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
+        found.append(Bed(plane(turned @ np.array([0.0, 0.0, low]), np.array([x, y, z])), (x, y, z), resting.friction))
+    if case.jaw is not None:
+        found.append(jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth))
+    return tuple(found)
+
+
+def jaw_at(jaw: Probe, frame: Frame, pace: float) -> Bed:
+    """Return the surface of a second ``jaw`` in its ``frame``, which goes ``pace`` times as far as the tool."""
+    tool = tool_at(jaw, frame, 0.0)
+    return Bed(
+        lambda points, depth: tool.distance(points, pace * depth),
+        frame.axis,
+        tool.friction,
+        pace,
+        tool.height,
+        tool.ends_at,
+        frame.point,
+    )
 
 
 def normal_of(case: Case) -> Vector:

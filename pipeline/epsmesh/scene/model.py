@@ -31,6 +31,7 @@ from epsmesh.shapes.surface import Surface, Tube
 
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
+JAW = "jaw"  # what a second jaw may touch
 SLIT = "slit"  # the part of a slit's faces that the blade does not touch
 MIRROR = {"x": "mirror_x", "y": "mirror_y"}
 
@@ -47,8 +48,9 @@ class Scene:
 
     ``column`` is the radius (m) of the part kept around the probe's axis, or infinite; with ``is_ball`` the part within
     that distance of the contact is kept. ``rim_segments`` is the number of edges along a round rim, for ``straight``
-    elements, which cannot be curved. ``mirrors`` are the planes of symmetry; only their positive side is modelled.
-    ``rim_folds``: quarter-point elements at the rim would fold.
+    elements, which cannot be curved; ``jaw_segments`` are those of a ``jaw`` opposite the probe. ``mirrors`` are the
+    planes of symmetry; only their positive side is modelled. ``rim_folds``: quarter-point elements at the rim would
+    fold.
     """
 
     body: Body
@@ -60,11 +62,19 @@ class Scene:
     mirrors: tuple[str, ...] = ()
     is_ball: bool = False
     rim_folds: bool = False
+    jaw: Probe | None = None
+    jaw_segments: int = 0
+
+    @property
+    def tools(self) -> dict[str, tuple[Probe, int]]:
+        """The tool, and an opposite jaw if any, by their groups; with the number of edges along round rims."""
+        jaw = {} if self.jaw is None else {JAW: (self.jaw, self.jaw_segments)}
+        return {PROBE: (self.probe, self.rim_segments)} | jaw
 
     @property
     def has_quarter_points(self) -> bool:
         """Whether elements at the rim have quarter points."""
-        return self.probe.has_singular_edge and not self.rim_folds
+        return any(tool.has_singular_edge for tool, _ in self.tools.values()) and not self.rim_folds
 
     @property
     def frame(self) -> Frame:
@@ -126,6 +136,9 @@ def build(scene: Scene) -> list[int]:
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     printed, beside = _add_contact(scene, volumes)
+    of_probe = len(printed)
+    if scene.jaw is not None:
+        printed = [*printed, (2, scene.jaw.draw(occ, scene.jaw.frame_on(scene.body), scene.units))]
     heights = (*scene.body.hold.edges(), *scene.body.interfaces)
     tools = [*printed, *((2, _add_level(scene.units(height))) for height in heights)]
     tools += draw_inclusions(scene.body.inclusion, scene.units)
@@ -144,17 +157,29 @@ def build(scene: Scene) -> list[int]:
         occ.remove(stray, recursive=True)
         occ.synchronize()
     parts = children[len(volumes) : len(volumes) + len(printed)]
-    footprint = [tag for part in parts for _, tag in part if tag in inside]
-    if not footprint:
+    footprint, jaw = (
+        [tag for part in own for _, tag in part if tag in inside] for own in (parts[:of_probe], parts[of_probe:])
+    )
+    if not footprint or (scene.jaw is not None and not jaw):
         raise SceneError("no part of the probe's footprint is on the body")
     inclusions = children[len(volumes) + len(printed) + len(heights) : first]
     regions = regions_of(scene.body, inclusions, scene.scale)
     if slit := scene.probe.slit:
         count = len(slit.free(0.0))
         free = [tag for part in children[first : first + count] for _, tag in part if tag in inside]
-        _name_groups(scene, footprint, regions, free)
+        _name_groups(scene, footprint, regions, slit=free)
         return singular_curves(slit, scene.frame, footprint + free, scene.scale)
-    _name_groups(scene, footprint, regions)
+    _name_groups(scene, footprint, regions, jaw=jaw)
+    return _rim(scene, footprint)
+
+
+def rims(scene: Scene) -> dict[str, list[int]]:
+    """Return the curves of the rims of gmsh's current model, by the groups of their tools."""
+    groups = {gmsh.model.getPhysicalName(*group): group for group in gmsh.model.getPhysicalGroups(2)}
+    return {name: _rim(scene, gmsh.model.getEntitiesForPhysicalGroup(*groups[name])) for name in scene.tools}
+
+
+def _rim(scene: Scene, footprint: Sequence[int]) -> list[int]:
     edge = gmsh.model.getBoundary([(2, tag) for tag in footprint], oriented=False)
     return [abs(tag) for _, tag in edge if not _is_on_mirror(scene, sample_curve(abs(tag)))]
 
@@ -240,15 +265,23 @@ def _add_level(height: float) -> int:
     return int(gmsh.model.occ.addRectangle(-size / 2, -size / 2, height, size, size))
 
 
-def _name_groups(scene: Scene, footprint: list[int], regions: dict[int, list[int]], slit: Sequence[int] = ()) -> None:
+def _name_groups(
+    scene: Scene,
+    footprint: list[int],
+    regions: dict[int, list[int]],
+    *,
+    slit: Sequence[int] = (),
+    jaw: Sequence[int] = (),
+) -> None:
     """Put every volume, every boundary face, and every face of a slit into its physical group."""
     model = gmsh.model
     volumes = model.getEntities(3)
     groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: [], SLIT: list(slit)}
+    groups |= {JAW: list(jaw)}
     groups |= {MIRROR[plane]: [] for plane in scene.mirrors}
     tests = _face_tests(scene)
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
-        if tag in footprint or tag in slit:
+        if any(tag in own for own in (footprint, slit, jaw)):
             continue
         points = _sample(tag, isinstance(scene.body, FromCad)) * scene.scale
         name = next((name for name, test in tests if test(points)), FREE)

@@ -152,6 +152,13 @@ class Frame:
         # Exact zeros: rounding across the axis would be a movement.
         return Frame((px, py, pz), (nx, ny, nz), (0.0, 0.0, -1.0), (ax, ay, 0.0))
 
+    def turned_by(self, turn: FloatArray | None) -> "Frame":
+        """Return the same place after a rotation (3, 3) of the body about the origin; None is none."""
+        if turn is None:
+            return self
+        vectors = (self.point, self.normal, self.axis, self.along)
+        return Frame(*((float(x), float(y), float(z)) for x, y, z in (turn @ np.array(vector) for vector in vectors)))
+
     def at(self, along: float, across: float) -> Vector:
         """Return the point (m) with these coordinates in the probe's own plane."""
         x, y, z = (p + along * t + across * s for p, t, s in zip(self.point, self.along, self.across, strict=True))

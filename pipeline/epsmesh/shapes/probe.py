@@ -5,7 +5,7 @@ from functools import lru_cache
 from math import hypot, inf
 from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field, PrivateAttr
 from pydantic_core import PydanticCustomError
 
 from epsmesh.arrays import BoolArray, FloatArray
@@ -120,6 +120,20 @@ class Probe(Footprint):
         ),
     ] = None
 
+    together: Annotated[
+        Literal["grasp"] | None,
+        Field(exclude=True),
+        Words(
+            "Two [[probe]] tables, one after the other, are the jaws of a grasp: the second is where the axis of the "
+            "first leaves the body, and closes at the same time. Keys that it leaves out are those of the first.",
+            '"grasp"',
+            default="none: one tool",
+        ),
+    ] = None
+
+    # The second jaw of a grasp, whose place is known with the body alone: see grasp.py.
+    _jaw: "Probe | None" = PrivateAttr(default=None)
+
     # Keys to which F is proportional, with known contact, if all change together; the first is the unit of the others.
     PROPORTIONAL_TO: ClassVar[tuple[str, ...]]
     # Whether the tool is a flat face, all of which is its footprint; otherwise contact grows with the depth.
@@ -146,6 +160,17 @@ class Probe(Footprint):
             PlaceError: if it cannot touch the body there.
         """
         return _frame_on(self, body)
+
+    @property
+    def jaw(self) -> "Probe | None":
+        """The second jaw of a grasp, of which it is the first; None of a tool alone."""
+        return self._jaw
+
+    def grasping(self, jaw: "Probe | None") -> Self:
+        """Return the tool with a second ``jaw``."""
+        found = self.model_copy()
+        found._jaw = jaw
+        return found
 
     @property
     def lies_along(self) -> Vector:

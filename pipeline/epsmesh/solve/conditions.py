@@ -6,6 +6,7 @@ from math import isfinite
 import numpy as np
 
 from epsmesh.arrays import FloatArray
+from epsmesh.scene.model import FIXED
 from epsmesh.solve import SolveError
 from epsmesh.solve.movement import Vector
 from epsmesh.solve.terms import AddedTerm
@@ -55,7 +56,8 @@ class Conditions:
     of symmetry that bound the mesh the normal displacement is zero. A probe in a slit with that ``front`` touches both
     faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
     ``terms`` act on the body besides its law, whose stiffness has a ``variation``, if it varies within regions. A
-    support that is ``released`` fixes nothing: the active set does.
+    support that is ``released`` fixes nothing: the active set does. ``beds`` are the groups of facets that
+    contacts besides the tool's may touch: that of a released support, or of a jaw.
     """
 
     bonded: bool = True
@@ -64,12 +66,17 @@ class Conditions:
     tip: Front | None = None
     terms: tuple[AddedTerm, ...] = ()
     variation: Variation | None = None
-    released: bool = False
+    beds: tuple[str, ...] = ()
 
     @property
     def without_footprint(self) -> "Conditions":
         """The same without a tool."""
-        return replace(WITHOUT_FOOTPRINT, terms=self.terms, variation=self.variation, released=self.released)
+        return replace(WITHOUT_FOOTPRINT, terms=self.terms, variation=self.variation, beds=self.beds)
+
+    @property
+    def released(self) -> bool:
+        """Whether the support lets go."""
+        return FIXED in self.beds
 
     @property
     def components(self) -> tuple[int, ...]:

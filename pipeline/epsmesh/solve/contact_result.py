@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import nan, pi
+from math import isnan, nan, pi
 
 from epsmesh import fitted
 from epsmesh.shapes.section import in_mm
@@ -22,8 +22,8 @@ class ContactResult:
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere
     the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
-    bar by the size of elements there. ``rest`` is what a support that lets go does. ``shift`` (m) is how far loads
-    move the place of contact across the axis, NaN where the tool follows.
+    bar by the size of elements there. ``rest`` is what a support that lets go, or a second jaw, does. ``shift`` (m) is
+    how far loads move the place of contact across the axis, NaN where the tool follows.
     """
 
     area: float
@@ -59,7 +59,8 @@ class ContactResult:
 
     def with_least_bar(self, share: float) -> "ContactResult":
         """Return the contact with a relative bar on its area of at least ``share``, where it has one."""
-        return replace(self, bar=max(self.bar, share))  # max(nan, share) is NaN
+        rest = None if self.rest is None else self.rest.with_least_bar(share)
+        return replace(self, bar=max(self.bar, share), rest=rest)  # max(nan, share) is NaN
 
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.
@@ -76,11 +77,11 @@ class ContactResult:
 
 @dataclass(frozen=True)
 class RestResult:
-    """A body on a support that lets go: the ``force`` (3), N, of the support on it, the ``area`` (m²) in contact, and
-    that which has ``lifted`` off (m²).
+    """A body on a support that lets go, or held by a second jaw: its ``force`` (3), N, on the body, the ``area`` (m²)
+    in contact, and the rest of what it may touch, which has ``lifted`` off (m²).
 
-    ``normal`` (3) is the unit vector from the support into the body. ``bar`` is the relative 95 % bar on the area, NaN
-    if unknown.
+    ``normal`` (3) is the unit vector into the body. ``bar`` is the relative 95 % bar on the area, ``force_bar`` that on
+    the force of a jaw, NaN if unknown. ``torque`` (N m) is that of the tissue on a jaw with friction about its advance.
     """
 
     force: tuple[float, float, float]
@@ -88,6 +89,15 @@ class RestResult:
     area: float
     lifted: float
     bar: float = nan
+    force_bar: float = nan
+    torque: float = nan
+    torque_bar: float = nan
+
+    def with_least_bar(self, share: float) -> "RestResult":
+        """Return it with relative bars on force and area of a jaw of at least ``share``."""
+        if isnan(self.force_bar):
+            return self
+        return replace(self, bar=max(self.bar, share), force_bar=max(self.force_bar, share))
 
 
 @dataclass(frozen=True)

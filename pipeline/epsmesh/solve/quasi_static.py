@@ -30,6 +30,7 @@ from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstim
 from epsmesh.solve.elements.displacement import DisplacementElements
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.estimate import error_bar, stiffness_bars
+from epsmesh.solve.hold import check_hold
 from epsmesh.solve.influence import cell_influence
 from epsmesh.solve.linear_solver import LinearSolver
 from epsmesh.solve.movement import Motion, Movement
@@ -39,7 +40,6 @@ from epsmesh.solve.prescribed import PrescribedMotion, respond
 from epsmesh.solve.response import LoadResponse, Response, shares
 from epsmesh.solve.solution import Problem, Request, Solution
 from epsmesh.solve.spaces import Spaces
-from epsmesh.solve.terms import check_hold
 from epsmesh.solve.time_steps import Indentation, TimeSteps, follow_course
 from epsmesh.solve.unloaded import Unloaded
 from epsmesh.stages import recharge, recorded, stage
@@ -310,7 +310,7 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
 def _with_bars(contact: ContactResult, finer: HierarchicalEstimate) -> ContactResult:
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
     if contact.rest is not None:
-        found = replace(found, rest=replace(contact.rest, bar=finer.rest_bar))
+        found = replace(found, rest=replace(contact.rest, bar=finer.rest_bar, force_bar=finer.rest_force_bar))
     if contact.rubbing is None or finer.relative is None:
         return found
     of_slip, of_force = contact.rubbing.bars(contact.area, float(finer.relative[0]), finer.area_bar)

@@ -44,9 +44,9 @@ class ElasticSpace:
     """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
-    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of a support that lets go, index owned blocks of three
-    dofs. ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the
-    conditions, ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
+    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of beds, index owned blocks of three dofs.
+    ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the conditions,
+    ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
 
     children = None  # the next space is on the same mesh: see ``CoarseSpace``
@@ -66,10 +66,8 @@ class ElasticSpace:
         index_map = space.dofmap.index_map
         self.owned, self.size = 3 * index_map.size_local, 3 * index_map.size_global
         probe, fixed = (_points(space, body, name) for name in (PROBE, FIXED))
-        if conditions.released:
-            fixed, resting = _NO_DOFS, fixed
-        else:
-            resting = _NO_DOFS
+        fixed = _NO_DOFS if conditions.released else fixed
+        resting = np.concatenate([_NO_DOFS, *(_points(space, body, name) for name in conditions.beds)])
         # Candidates for unilateral contact may be on the support: the active set leaves them out.
         if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the fixed face: no displacement satisfies both conditions")

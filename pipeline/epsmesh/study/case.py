@@ -9,6 +9,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import curvature_below, is_level
 from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.grasp import opposite
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.shapes.tissue import Tissue
@@ -126,6 +127,12 @@ class Case:
             return probe
         bump = curvature_below(self.body, probe, self.frame)
         return probe.on_bump(bump) if bump else probe
+
+    @property
+    @of_scene
+    def jaw(self) -> Probe | None:
+        """The second jaw, at its place; None without one."""
+        return opposite(self.body, self.probe)
 
     @property
     def features(self) -> frozenset[str]:
@@ -262,7 +269,8 @@ class Case:
         Deep in tissue they would fold. Of slopes like r^-½, the squares in Green's strain of a capsule have no finite
         energy.
         """
-        if not self.probe.has_singular_edge:
+        tools = (self.probe,) if self.jaw is None else (self.probe, self.jaw)
+        if not any(tool.has_singular_edge for tool in tools):
             return True
         if any(capsule.tension_only for capsule in self.body.skins):
             return False

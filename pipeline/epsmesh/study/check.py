@@ -61,6 +61,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     if linear:
         problems.each(warn_of_depth, probe=probes)
     problems.each(lambda probe, _: probe.check(problems), probe=probes)
+    problems.each(lambda probe, _: probe.jaw and probe.jaw.check(problems), probe=probes)
     problems.each(check_history, probe=probes)
     problems.each(check_sizes, mesh=meshes)
     check_chosen(meshes, problems)
@@ -222,12 +223,13 @@ def _check_boundary(body: Body, problems: Problems) -> None:
 
 def _check_thickness(body: Body, probe: Probe, problems: Problems) -> bool:
     """Report a depth larger than the thickness of the body, and warn of one that compresses all of the thickness."""
-    thickness = body.thickness(probe.frame_on(body))
-    if probe.deepest >= thickness:
+    thickness, closes = body.thickness(probe.frame_on(body)), probe.jaw.depth if probe.jaw else 0.0
+    if probe.deepest + closes >= thickness:
+        both = " of both jaws together" if probe.jaw else ""
         problems.error(
             "probe.insertion.to" if getattr(probe, "insertion", None) else "probe.depth",
             in_mm(probe.deepest),
-            f"must be below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
+            f"must be{both} below {in_mm(thickness)}, the thickness of the tissue under the tool, along its axis",
         )
         return False
     if LINEAR * thickness < probe.deepest <= LINEAR * probe.half_width and probe.force is None:

@@ -20,6 +20,10 @@ from epsmesh.study.problems import Problems, nearest
 from epsmesh.study.regions import tissues_of
 from epsmesh.study.schema import Material
 
+PRESSES_NOT = (
+    "has a pressure within, which does not press the body on [body.support]: add gravity or a traction to [load], omit "
+    "the pressure, or give body.fixed"
+)
 # Largest distance of a centre from the surface, in units of the cap's radius.
 _FARTHEST_OFF = 0.5
 
@@ -38,10 +42,15 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
             _check_capsules(body, problems)
             _check_rest(body, problems)
     problems.each(lambda body, _: _check_imaged(body, loads, problems), body=bodies)
+    is_grasped = any(probe.jaw for probe in probes)
     for body, load in product(bodies, loads):
-        if body.fixed == NONE and body.resting is None and not any(term.HOLDS for term in load.terms):
+        is_held = body.resting is not None or is_grasped or any(term.HOLDS for term in load.terms)
+        if body.fixed == NONE and not is_held:
             with problems.about(body=body):
                 _nothing_holds(problems)
+        if body.resting is not None and body.pressures and not (load.acts or load.terms):
+            with problems.about(body=body):
+                problems.error("body.region", None, PRESSES_NOT)
         for name in TERMS:
             for number, term in enumerate(getattr(load, name), start=1):
                 with problems.about(body=body):

@@ -9,6 +9,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import check_contact, check_first_touch, edge_gap, is_level, lifted_edge
 from epsmesh.shapes.frame import Frame, PlaceError
 from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.grasp import check_opposite, opposite
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
 
@@ -36,6 +37,8 @@ def _place_error(body: Body, probe: Probe, is_directed: bool) -> PlaceError | No
             _check_fit(body, probe, frame)
         if not is_level(body, frame) or isinstance(body, FromFile):
             _check_contact(body, probe, frame)
+        if (jaw := opposite(body, probe)) is not None:
+            _check_jaw(body, probe, jaw)
     except PlaceError as error:
         return error.with_traceback(None)  # it would keep all that was found on the way, and is itself kept
     return None
@@ -68,6 +71,16 @@ def _check_fit(body: Body, probe: Probe, frame: Frame) -> None:
         raise PlaceError(
             f"{_footprint(probe)} must be inside the top face of the body ({body.face}), not on or over its edge"
         )
+
+
+def _check_jaw(body: Body, probe: Probe, jaw: Probe) -> None:
+    """Check that the second jaw of a grasp fits on its face, opposite the tool, and away from the support."""
+    frame = jaw.frame_on(body)
+    if jaw.gap(body, frame) <= _TOUCHING * body.extent:
+        raise PlaceError(f"of the second jaw, {_footprint(jaw)} must be inside one face, not on or over its edge")
+    check_opposite(body, probe)
+    if held_gap(body, jaw, frame) <= _TOUCHING * body.extent:
+        raise PlaceError(f"of the second jaw, {_footprint(jaw)} must not reach the support of the body")
 
 
 def _footprint(probe: Probe) -> str:

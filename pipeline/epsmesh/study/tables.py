@@ -10,9 +10,11 @@ from pydantic import ValidationError
 
 from epsmesh.shapes.history import deepest
 from epsmesh.shapes.insertion import last_depth
+from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.registry import specialised
 from epsmesh.shapes.section import Section
 from epsmesh.study.axis import Axis
+from epsmesh.study.grasp import JAW, jaw_of, with_jaws
 from epsmesh.study.meant import OTHER_SHAPES, other_name
 from epsmesh.study.path import Way, read_path
 from epsmesh.study.problems import MOST_ERRORS, Problems, closest, nearest, tuples
@@ -33,7 +35,7 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     if name not in SINGLE:
         raw = without_ranges(raw, name, problems)
     if name == "probe":
-        raw = _reaching(raw, problems)
+        raw = _reaching(with_jaws(raw, problems), problems)
         raw, way = _walked(raw, problems)
         axes, variants = _read_tables(name, raw, problems)
         return (_axes_of(way, axes) if way else axes), variants
@@ -225,13 +227,13 @@ def _possible(name: str, raw: dict[str, Any], problems: Problems, where: str = "
     if isinstance(models, Mapping) and (not isinstance(shape, str) or shape not in models):
         return raw  # keys that no shape has are reported with it
     model = models[str(shape)] if isinstance(models, Mapping) else models
-    lacking = [key for key in raw if key not in model.model_fields]
+    lacking = [key for key in raw if key not in model.model_fields and key != JAW]
     for key in lacking[:MOST_ERRORS]:
         found = None if key in NESTED.get(name, {}) else raw[key]
         problems.unknown(f"{where or name}.{key}", found, _lacking(name, model, str(shape), key))
     if len(lacking) > MOST_ERRORS:
         problems.unknown(where or name, None, f"… and {len(lacking) - MOST_ERRORS} more")
-    return {key: value for key, value in raw.items() if key in model.model_fields}
+    return {key: value for key, value in raw.items() if key in model.model_fields or key == JAW}
 
 
 def _lacking(name: str, model: type[Section], shape: str, key: str) -> str:
@@ -315,4 +317,5 @@ def _validate_each(
 
 
 def _validate(model: type[Section], raw: dict[str, Any]) -> Section:
-    return specialised(model.model_validate({key: tuples(value) for key, value in raw.items()}))
+    found = specialised(model.model_validate({key: tuples(value) for key, value in raw.items() if key != JAW}))
+    return found.grasping(jaw_of(raw)) if isinstance(found, Probe) and JAW in raw else found

@@ -11,14 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.scene.model import CUT, FIXED, PROBE
+from epsmesh.scene.model import CUT, FIXED, JAW, PROBE
 from epsmesh.view.fields import Fields
 from epsmesh.view.palette import VIRIDIS, YLGNBU, YLORRD, region_colours
 from epsmesh.view.tool import tool_of
 
 _MM, _KPA = 1e3, 1e-3
 # Numbers that the script knows groups of the boundary by; 0 is free.
-_GROUPS = {PROBE: 1, FIXED: 2, CUT: 3}
+_GROUPS = {PROBE: 1, JAW: 1, FIXED: 2, CUT: 3}
 # Strains are shown over this range below the largest, which the singular edge of the probe has.
 _STRAINS = 1e-3
 # Below this (m) a scale of lengths is read in µm, as in scene.js.

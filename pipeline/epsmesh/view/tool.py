@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.scene.model import PROBE
+from epsmesh.scene.model import JAW, PROBE
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
@@ -31,16 +31,27 @@ class Tool:
 
 
 def tool_of(fields: Fields) -> Tool:
-    """Return the tool of a case: its footprint, extruded, with the footprint's displacement; or its own surface."""
+    """Return the tool of a case, and the second jaw of a grasp."""
     case = fields.case
-    length, outward = _LENGTH * case.probe.circumradius, np.array(case.frame.outward)
-    if not case.probe.is_flat:
-        lines = _lines(case.probe, length)
+    tool = _tool(fields, case.probe, PROBE)
+    if case.jaw is None:
+        return tool
+    jaw = _tool(fields, case.jaw, JAW)
+    triangles = np.vstack([tool.triangles, jaw.triangles + len(tool.points)])
+    return Tool(np.vstack([tool.points, jaw.points]), triangles, np.vstack([tool.moved, jaw.moved]))
+
+
+def _tool(fields: Fields, probe: Probe, group: str) -> Tool:
+    """Return a tool: its footprint, extruded, with the displacement of its ``group``; or its own surface."""
+    body, frame = fields.case.body, probe.frame_on(fields.case.body)
+    length, outward = _LENGTH * probe.circumradius, np.array(frame.outward)
+    if not probe.is_flat:
+        lines = _lines(probe, length)
         # The depth counts from where the tool first touches, which may be beside its axis.
-        *_, first = first_touch(case.body, case.probe, case.frame)
-        points = case.frame.world(lines.reshape(-1, 3)) - first * outward
-        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(case.travel, (len(points), 1)))
-    used, corners = np.unique(fields.facets[PROBE], return_inverse=True)
+        *_, first = first_touch(body, probe, frame)
+        points = frame.world(lines.reshape(-1, 3)) - first * outward
+        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(probe.travel(frame), (len(points), 1)))
+    used, corners = np.unique(fields.facets[group], return_inverse=True)
     base, below = fields.points[used], corners.reshape(-1, 3)
     moved = np.zeros_like(base) if fields.displacement is None else fields.displacement[used]
     count, (first, second) = len(used), _rim(below).T

@@ -14,9 +14,10 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.deformed import ContactSolution, NoTouchError, PlacedTool, solve_contact
+from epsmesh.solve.contact.deformed import solve_contact
 from epsmesh.solve.contact.elements import ContactElements, SurfaceState
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.touching import ContactSolution, NoTouchError, PlacedTool
 from epsmesh.solve.newton import LargeError
 from epsmesh.stages import stage
 

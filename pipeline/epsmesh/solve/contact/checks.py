@@ -1,5 +1,6 @@
 """Checks of contact at equilibrium that are independent of the loop that finds it, in two and in three dimensions."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -7,9 +8,8 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.balance import check_work
 from epsmesh.solve.contact.active_set import ContactError
-from epsmesh.solve.contact.deformed import ContactSolution, SteppedTissue, Tissue
 from epsmesh.solve.contact.surface import Candidates
-from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution, SteppedTissue, Tissue
 from epsmesh.solve.newton import LargeError
 
 
@@ -27,13 +27,13 @@ def force_of(touched: ContactSolution) -> float:
     return -float(touched.forces[:, -1].sum())
 
 
-def check_edge(tool: Tool, candidates: Candidates, active: BoolArray) -> None:
-    """Check that the contact of ``active`` nodes (n) ends within the candidates, or where the tool does.
+def check_edge(ends_at: Callable[[FloatArray], BoolArray], candidates: Candidates, active: BoolArray) -> None:
+    """Check that the contact of ``active`` nodes (n) ends within the candidates, or where the tool does: ``ends_at``.
 
     Raises:
         ContactError: if it reaches their edge elsewhere.
     """
-    if not np.all(tool.ends_at(candidates.points[active & candidates.is_edge])):
+    if not np.all(ends_at(candidates.points[active & candidates.is_edge])):
         raise ContactError(
             "the contact reaches the edge of the surface region that is searched for contact: "
             "use a smaller depth, or align the probe's axis with the surface normal"

@@ -30,7 +30,8 @@ class Constraint:
     the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
     subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions; where they are friction,
     ``sliding`` is how they follow the reactions, for tissue that can solve for both. ``is_there``: held slots are next
-    to where they are held. ``resting`` (n) are the nodes above a bed: None if there is none.
+    to where they are held. ``resting`` (n) are the nodes above a bed: None if there is none. ``floats``: held slots
+    alone hold the body.
     """
 
     frames: FloatArray
@@ -41,6 +42,7 @@ class Constraint:
     sliding: Sliding | None = None
     is_there: bool = False
     resting: BoolArray | None = None
+    floats: bool = False
 
     @property
     def is_turned(self) -> bool:

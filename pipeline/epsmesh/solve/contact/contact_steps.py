@@ -13,19 +13,13 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.coulomb import Slide, most_simplified
-from epsmesh.solve.contact.deformed import (
-    ContactSolution,
-    PlacedTool,
-    SteppedTissue,
-    continue_linear,
-    first_set,
-    solve_contact,
-)
+from epsmesh.solve.contact.deformed import continue_linear, first_set, solve_contact
 from epsmesh.solve.contact.friction_step import FrictionStep, meeting_places
 from epsmesh.solve.contact.parts import TOOL
 from epsmesh.solve.contact.surface import Neighbours
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool, SteppedTissue
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 
@@ -63,7 +57,7 @@ class ContactPath(Path[ContactPathPoint]):
 class Friction:
     """Coulomb's ``coefficient`` (infinite: it sticks) for a tool that moves along the unit vector ``advance``.
 
-    Where nodes above a bed are among all, both are given for each node: (n), and (n, d), zero on the bed.
+    Where nodes above a bed are among all, both are given for each node: (n), and (n, d), zero on a support.
     ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path. ``is_linear``: the
     tissue is, and the initial guess of a step is its solution for the contact before.
     """
@@ -78,7 +72,7 @@ class Friction:
     @classmethod
     def on(cls, body: DeformedBody, tool: Tool, depth: float) -> "Friction":
         """Return the friction of a ``tool`` that advances along −z to a ``depth`` (m) on a ``body``; collective."""
-        coefficients, penalties = [tool.friction, *(inf if bed.sticks else 0.0 for bed in tool.beds)], list[float]()
+        coefficients, penalties = [tool.friction, *(bed.friction for bed in tool.beds)], list[float]()
         parts = [body.part(number) for number in range(len(coefficients))]
         for part in parts:
             width = float(np.median(part.candidates.widths[part.candidates.widths > 0]))
@@ -90,7 +84,9 @@ class Friction:
             for part, own, of_part in zip(parts, coefficients, penalties, strict=True):
                 coefficient[part.nodes] = own
                 penalty[part.nodes] += of_part
-            advance = np.where(parts[TOOL].mask(len(body.fixed))[:, None], advance, 0.0)
+            ways, advance = [advance, *(bed.advance for bed in tool.beds)], np.zeros(body.fixed.shape)
+            for part, way in zip(parts, ways, strict=True):
+                advance[part.nodes] = way
         return cls(coefficient, advance, penalty, body.candidates.neighbours, depth)
 
 
@@ -147,7 +143,7 @@ def _first_step(tissue: SteppedTissue, tool_at: Callable[[float], PlacedTool], s
     step, nothing = depth - start, np.zeros(len(tissue.fixed), dtype=bool)
     for _ in range(_FIRST_HALVINGS):
         tool = tool_at(start + step)
-        through = first_set(tissue, tool, nothing)
+        through = tool.of_tool(first_set(tissue, tool, nothing))
         if not through.any() or -tool.distance(tissue.positions()).normal[through, -1].mean() >= _FACING:
             break
         step /= 2

@@ -14,26 +14,20 @@ Nodes that rest on a bed (:mod:`.bed`) are among them, with the distance of that
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot, inf
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
-from epsmesh.solve.contact.bed import Resting
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.coulomb import Slide
 from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
+from epsmesh.solve.contact.touching import SLACK, ContactSolution, NoTouchError, PlacedTool, Tissue
 from epsmesh.solve.contact.turned import turned_frames
-from epsmesh.solve.newton import HALVINGS, LargeError, Moving, Newton, advance, is_less
+from epsmesh.solve.newton import HALVINGS, LargeError, Newton, advance, is_less
 
-# Tension below this share of the mean reaction, and penetration below this share of the depth, are solver error.
-SLACK = 1e-6
-# The same for penetration of nodes that stick where they touch: one that leaves carries forces along the bed, too, and
-# sets of nodes that hardly press would follow each other forever.
-_STICKING = 1e-3
 # Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
 LEFT, _CLOSED = 1e-8, 1e-8
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
@@ -56,99 +50,6 @@ _WHOLE, _SOON, _NEARLY_CLOSED = 0.5, 10, 1e-3
 _CERTAIN = 10.0
 # A set that is tried so often ends changes of many nodes at once.
 _ONE_BY_ONE = 3
-
-
-class Tissue(Moving, Protocol):
-    """A body seen from n nodes of its surface, at its current state. Methods are collective.
-
-    ``fixed`` (n, d) marks prescribed components.
-    """
-
-    fixed: BoolArray
-
-    def positions(self) -> FloatArray:
-        """Return the nodes' deformed positions (n, d), in m."""
-
-    def forces(self) -> FloatArray:
-        """Return the nodal forces (n, d), N, that hold the nodes; zero at prescribed components."""
-
-    def unbalanced(self) -> float:
-        """Return the norm (N) of the residual at all other free dofs."""
-
-    def linearise(self, constraint: Constraint) -> FloatArray:
-        """Find the increment under a ``constraint``; return the nodal forces (n, d), N, that it predicts.
-
-        Raises:
-            SolveError: if the linear solver fails.
-        """
-
-
-class SteppedTissue(Tissue, Protocol):
-    """A body on a path: ``state`` are the unknowns of this rank; ``is_sound`` says that J > 0."""
-
-    state: FloatArray
-
-    @property
-    def is_sound(self) -> bool: ...  # noqa: D102
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedTool:
-    """The tool at one ``depth`` (m): its ``distance`` from points (n, d).
-
-    Reactions of the ``followers`` (n) mean nothing, as those of corners in degree 2. ``complete`` returns an active set
-    that nodes may have: without those of the support, and with followers only where all their neighbours are active.
-    ``resting`` are those that other surfaces than the tool's may touch, None if there are none.
-    """
-
-    distance: Callable[[FloatArray], Distance]
-    complete: Callable[[BoolArray], BoolArray]
-    followers: BoolArray
-    depth: float
-    resting: Resting | None = None
-
-    def touches(self, active: BoolArray) -> bool:
-        """Return whether the tool touches one of the ``active`` nodes (n)."""
-        return bool((active if self.resting is None else active & ~self.resting.nodes).any())
-
-    @property
-    def slack(self) -> float | FloatArray:
-        """The penetration (m) that is solver error, of all or of each node (n)."""
-        least = SLACK * self.depth
-        return least if self.resting is None else np.where(self.resting.stick, _STICKING * self.depth, least)
-
-    def start(self) -> BoolArray:
-        """Return the nodes (n) that touch at the start of a path."""
-        return np.zeros(len(self.followers), dtype=bool) if self.resting is None else self.resting.begin
-
-
-@dataclass(frozen=True, eq=False)
-class ContactSolution:
-    """Contact at equilibrium: the ``active`` nodes (n), forces of the tool on the nodes (n, d), N, and gaps (n), m.
-
-    ``normal`` (n, d) are the tool's unit normals at the nodes. ``slide`` is the state of friction, None without.
-    """
-
-    active: BoolArray
-    forces: FloatArray
-    gap: FloatArray
-    iterations: int
-    normal: FloatArray
-    slide: Slide | None = None
-
-    @property
-    def pressed(self) -> FloatArray:
-        """The normal parts (n) of the forces (N)."""
-        return np.asarray(np.einsum("ni,ni->n", self.forces, self.normal))
-
-    @property
-    def friction(self) -> FloatArray:
-        """The tangential parts (n, d) of the forces (N)."""
-        return np.asarray(self.forces - self.pressed[:, None] * self.normal)
-
-
-class NoTouchError(LargeError):
-    """The tool touches no node."""
 
 
 class Residual(NamedTuple):
@@ -241,6 +142,8 @@ class _InContact(Newton[ContactSolution]):
         if iteration and self._is_refuted(before, following, along):
             self._refuted.add(before.tobytes())
         self._active = active = self._with_care(before, following)
+        if self._floats:
+            raise NoTouchError("a jaw does not touch a single node: use smaller elements below it")
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
         # A rough solution has the next set: forces of nodes that leave it are residuals.
         pressing = before & active if is_rough else before
@@ -271,7 +174,7 @@ class _InContact(Newton[ContactSolution]):
         constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
         resting = self._tool.resting
         if resting is not None:
-            constraint = replace(constraint, resting=resting.nodes)
+            constraint = replace(constraint, resting=resting.nodes, floats=resting.floats)
         constraint = replace(constraint, is_there=self._is_closed)
         if self._friction is not None:
             constraint = self._friction.constrain(constraint, self._there, active)
@@ -365,6 +268,12 @@ class _InContact(Newton[ContactSolution]):
             slips = self._there.slips(resting.anchors)[held]
             found = max(found, float(np.linalg.norm(slips, axis=1).max(initial=0.0)))
         return found
+
+    @property
+    def _floats(self) -> bool:
+        """Whether nothing would hold the body in the next step: one of its jaws touches no node."""
+        resting = self._tool.resting
+        return resting is not None and resting.floats and not self._tool.touches(self._active)
 
     @property
     def _is_closed(self) -> bool:

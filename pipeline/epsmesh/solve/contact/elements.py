@@ -19,10 +19,10 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.deformed import Tissue
 from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.surface_body import SurfaceBody
+from epsmesh.solve.contact.touching import Tissue
 from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.fields import Column, Fields
 from epsmesh.solve.linear_solver import Level

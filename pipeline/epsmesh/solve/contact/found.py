@@ -19,12 +19,12 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve.cell_values import plain_share
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.active_set import Obstacle, SettledContact
-from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.elements import FreeResponse, Unknowns
 from epsmesh.solve.contact.estimators import area_fixed, estimate_of, found_again, half_the_steps
 from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.contact.sweep import Sweep
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column, add_far

@@ -24,9 +24,9 @@ from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.condensed import CondensedTissue
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, reach_contact_with_friction
 from epsmesh.solve.contact.coulomb import Slide
-from epsmesh.solve.contact.deformed import SLACK, ContactSolution, PlacedTool
 from epsmesh.solve.contact.found import LinearContact, Rubbed
 from epsmesh.solve.contact.surface import Candidates, Neighbours
+from epsmesh.solve.contact.touching import SLACK, ContactSolution, PlacedTool
 from epsmesh.solve.newton import LargeError
 
 # Steps of a load path.

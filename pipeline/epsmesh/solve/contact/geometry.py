@@ -15,9 +15,9 @@ import numpy as np
 
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
-from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.elements import FreeResponse
 from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates
+from epsmesh.solve.contact.touching import ContactSolution
 
 # Search for the first touch: sampling points along an edge of each facet, rounds of refinement, the factor by which a
 # round is finer, and the number of nearest facets that are refined.

@@ -20,14 +20,15 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.contact_steps import ContactPathPoint, Friction, check_outside, friction_step
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, SteppedTissue, first_set, solve_contact
+from epsmesh.solve.contact.deformed import first_set, solve_contact
 from epsmesh.solve.contact.friction_step import Placed
-from epsmesh.solve.contact.large import on_surface
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.sagged import sagged_body
+from epsmesh.solve.contact.surface_contact import on_surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool, SteppedTissue
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.movement import Loads
 from epsmesh.solve.newton import LargeError
@@ -177,7 +178,7 @@ class ToolIndentation(ContactIndentation):
 
     def _measure(self, touched: ContactSolution, fraction: float) -> None:
         tissue = self._tissue
-        check_edge(self._tool, tissue.candidates, touched.active)
+        check_edge(self._tool.ends_at, tissue.candidates, touched.active)
         self.force = touched.forces.sum(axis=0)
         self.rate = -float(self.force[2]) * self._depth
         self.area = 0.0

@@ -34,15 +34,16 @@ from epsmesh.solve.contact.contact_steps import (
     reach_contact_with_friction,
 )
 from epsmesh.solve.contact.corrections import Corrections
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
+from epsmesh.solve.contact.deformed import first_set, solve_contact
 from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.rest import Rest, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
-from epsmesh.solve.contact.surface_contact import SurfaceContact
+from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column
@@ -96,7 +97,7 @@ class LargeContact:
             ContactError: if contact reaches the support or the edge of the candidates.
         """
         found, iterations = self._without_friction(asked, stack)
-        if self._tool.friction:
+        if self._tool.rubs:
             found, more = self._with_friction(found)
             iterations += more
         return found.equilibrium(asked.movement, iterations, stack)
@@ -223,7 +224,11 @@ class LargeContactSolution:
         """
         check_support(self.body, self.touched)
         tool = self.body.part()
-        check_edge(self.tool, tool.candidates, tool.of(self.touched.active))
+        check_edge(self.tool.ends_at, tool.candidates, tool.of(self.touched.active))
+        for number, bed in enumerate(self.tool.beds, start=1):
+            if bed.ends_at is not None:
+                part = self.body.part(number)
+                check_edge(bed.ends_at, part.candidates, part.of(self.touched.active))
         check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:
@@ -258,7 +263,7 @@ class LargeContactSolution:
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])
         least = fitted.AT_EDGE_LARGE[self.body.elements.degree]
-        decrement, bar = found_again_bar(share, at_edge, least, at_end=self._at_sharp_end())
+        decrement, bar = found_again_bar(share, at_edge, least, at_end=here.at_sharp_end)
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
@@ -266,7 +271,11 @@ class LargeContactSolution:
         if not self.rests:
             return found
         (rest, *_), (again, *_) = self.rests, finer.rests
-        return replace(found, rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1))
+        return replace(
+            found,
+            rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1),
+            rest_force_bar=rest.force_bar(again, self.body.elements.degree),
+        )
 
     def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
         """Return the rate with the same nodes in contact."""
@@ -331,28 +340,3 @@ class LargeContactSolution:
         reach_contact(body, tool_at, path, self.depth)
         assert path.last.touched is not None
         return path.last.touched
-
-    def _at_sharp_end(self) -> float:
-        """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
-        if not self.tool.is_sharp:
-            return 0.0
-        candidates, touched = self.surface_contact.candidates, self.surface_contact.touched
-        edge = np.flatnonzero(candidates.is_edge)
-        at_end = np.zeros(len(candidates), dtype=bool)
-        at_end[edge] = self.tool.ends_at(candidates.points[edge])
-        touching = touched.active[candidates.facets].any(axis=1)
-        areas = candidates.areas * touching
-        return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
-
-
-def on_surface(
-    body: DeformedBody, tool: Tool, touched: ContactSolution, coarse: ContactSolution | None = None
-) -> SurfaceContact:
-    """Return contact with a body, where its candidates are; ``coarse`` is that from half as many load steps."""
-    part = body.part()
-    candidates = part.candidates
-    if not body.law.is_linear:
-        candidates = replace(candidates, points=part.of(body.positions()))
-    modulus, mirrored = candidates.from_regions(body.law.plane_moduli), body.elements.body.mirrored
-    coarse = None if coarse is None else part.solution(coarse)
-    return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse)

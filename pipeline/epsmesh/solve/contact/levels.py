@@ -10,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.scene.model import PROBE
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
 from epsmesh.solve.contact.surface import Candidates, find_candidates
@@ -38,7 +38,7 @@ class Surface:
         """Return the candidates of a ``degree``; collective."""
         if degree not in self._found:
             space = self.space(degree)
-            groups = (PROBE, FIXED) if self._conditions.released else (PROBE,)
+            groups = (PROBE, *self._conditions.beds)
             self._found[degree] = find_candidates(self.spaces.body, space.space, space.means, groups)
         return self._found[degree]
 
@@ -141,21 +141,21 @@ class Hierarchy:
         """Positions of the candidates in the finest space."""
         return self._numberings[-1]
 
-    def hold(self, active: BoolArray, firm: BoolArray | None = None) -> list[Level]:
+    def hold(self, active: BoolArray, firm: BoolArray | None = None, *, floats: bool = False) -> list[Level]:
         """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective.
 
-        Those that are ``firm`` (n), too, are fixed along all axes.
+        Those that are ``firm`` (n), too, are fixed along all axes. ``floats``: nothing else holds the body.
         """
-        dofs = [numbering.normal_dofs(chosen) for numbering, chosen in self._on_levels(active)]
+        dofs = [numbering.normal_dofs(chosen) for numbering, chosen in self._on_levels(active, floats=floats)]
         if firm is not None:
             whole = (numbering.all_dofs(chosen) for numbering, chosen in self._on_levels(firm))
             dofs = [np.union1d(*both).astype(np.int32) for both in zip(dofs, whole, strict=True)]
         return [operator.hold(own) for operator, own in zip(self._operators, dofs, strict=True)]
 
-    def _on_levels(self, chosen: BoolArray) -> list[tuple[Numbering, BoolArray]]:
+    def _on_levels(self, chosen: BoolArray, *, floats: bool = False) -> list[tuple[Numbering, BoolArray]]:
         """Return the numbering of each level, and which of its candidates are ``chosen`` (n), by majority."""
         *coarser, finest = self._candidates
-        sets = [*(finest.lowered(chosen, lower) for lower in coarser), chosen]
+        sets = [*(finest.lowered(chosen, lower, floats=floats) for lower in coarser), chosen]
         return list(zip(self._numberings, sets, strict=True))
 
     def hold_facets(self, facets: Int32Array) -> list[Level]:

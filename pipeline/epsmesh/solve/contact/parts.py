@@ -7,8 +7,8 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, IntArray
 from epsmesh.solve.contact.coulomb import Slide
-from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.touching import ContactSolution
 
 # The number of the tool among the contacts.
 TOOL = 0

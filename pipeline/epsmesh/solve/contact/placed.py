@@ -1,13 +1,13 @@
-"""All that touches a body at one depth of the tool: the tool, and the beds that the body rests on."""
+"""All that touches a body at one depth of the tool: the tool, and what the body rests on or is held by besides."""
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.bed import Resting
-from epsmesh.solve.contact.deformed import PlacedTool
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import PlacedTool
 
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
@@ -27,12 +27,11 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
         return Distance(np.full(len(points), away), np.tile([0.0, 0.0, -1.0], (len(points), 1)), flat)
 
     def distance(points: FloatArray) -> Distance:
-        found = [of_tool, *(bed.distance for bed in beds)]
         count, dim = points.shape
         gap, normal, curvature = np.empty(count), np.empty((count, dim)), np.empty((count, dim, dim))
-        for number, of in enumerate(found):
+        for number in range(1 + len(beds)):
             part = body.part(number)
-            own = of(part.of(points))
+            own = beds[number - 1].distance(part.of(points), depth) if number else of_tool(part.of(points))
             gap[part.nodes], normal[part.nodes], curvature[part.nodes] = own.gap, own.normal, own.curvature
         return Distance(gap, normal, curvature)
 
@@ -45,11 +44,13 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
 
 
 def _resting(body: DeformedBody, tool: Tool) -> Resting:
-    """Return the nodes on the beds of a ``tool``; without an earlier contact, all of them touch."""
+    """Return the nodes on the beds of a ``tool``; without an earlier contact, all of them on a support touch."""
     count = len(body.candidates)
-    nodes, stick = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    nodes, stick, begin = (np.zeros(count, dtype=bool) for _ in range(3))
     for number, bed in enumerate(tool.beds, start=1):
         nodes[body.part(number).nodes] = True
         stick[body.part(number).nodes] = bed.sticks
-    begin = nodes if tool.begins is None else tool.begins
-    return Resting(nodes, begin, stick, body.places)
+        begin[body.part(number).nodes] = bed.is_support
+    jaws = tuple(body.part(n).mask(count) for n, bed in enumerate(tool.beds, start=1) if not bed.is_support)
+    begin = begin if tool.begins is None else tool.begins
+    return Resting(nodes, begin, stick, body.places, jaws, bool(jaws) and not body.is_held)

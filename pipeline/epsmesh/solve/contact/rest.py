@@ -1,19 +1,22 @@
-"""What a bed does to the body that rests on it: reaction, and area in contact."""
+"""What a bed does to a body that rests on it, or that it holds as a jaw: reaction, and area in contact."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import nan
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.bed import Bed
-from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.contact_result import RestResult
+from epsmesh.solve.estimate import found_again_bar
 from epsmesh.solve.response import whole_force
 
 
@@ -61,12 +64,29 @@ class Rest:
         """Return that of the whole body."""
         whole = 2.0 ** len(self.mirrored)
         x, y, z = map(float, whole_force(self.force, self.mirrored))
-        return RestResult(
+        found = RestResult(
             force=(x, y, z),
             normal=self.bed.normal,
             area=whole * self.area.value,
             lifted=whole * max(self.whole_area - self.area.value, 0.0),
         )
+        if self.bed.is_support or not self.bed.friction:
+            return found
+        if self.mirrored:  # a mirror image has the opposite torque
+            return replace(found, torque=0.0, torque_bar=0.0)
+        arms = self.candidates.points - np.array(self.bed.foot)
+        return replace(found, torque=-float(np.cross(arms, self.touched.forces).sum(axis=0) @ self.bed.normal))
+
+    @property
+    def pressed(self) -> float:
+        """The force (N) on the modelled part along the normal."""
+        return float(self.force @ np.array(self.bed.normal))
+
+    def force_bar(self, finer: "Rest", degree: int) -> float:
+        """Return the relative bar on the force of a jaw, from contact that was found again in a ``finer`` degree."""
+        if self.bed.is_support:
+            return nan
+        return found_again_bar(1 - finer.pressed / self.pressed, self.area.bar, fitted.AT_EDGE_LARGE[degree])[1]
 
 
 def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> tuple[Rest, ...]:

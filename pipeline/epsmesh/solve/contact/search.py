@@ -91,7 +91,7 @@ class ContactSearch:
         if np.any(obstacle.bounds[elements.is_fixed] < 0):
             raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
         first, found = self._find(sweep, obstacle, (_LOOSE, strict), loaded)
-        check_edge(self._tool, self.candidates, found.active)
+        check_edge(self._tool.ends_at, self.candidates, found.active)
         unknowns = elements.unknowns()
         iterations = first + found.touched.iterations
         contact = LinearContact(

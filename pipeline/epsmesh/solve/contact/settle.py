@@ -5,15 +5,18 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
-from epsmesh.solve.contact.deformed import ContactSolution, solve_contact
+from epsmesh.solve.contact.deformed import solve_contact
 from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.newton import EASY, LargeError
 from epsmesh.solve.path import Path, PathPoint, follow
 from epsmesh.solve.response import whole_force
 from epsmesh.stages import stage
 
+# Loads below this share of their size, such as the resultant of a pressure within, press no body on: that is rounding.
+_PRESSES = 1e-6
 # Residual and gaps of a settled body in elements of one degree more.
 _ROUGH = 1e-3
 
@@ -33,8 +36,9 @@ def settle(body: DeformedBody, tool: Tool, guess: FloatArray | None = None) -> C
     extent = float(np.linalg.norm(np.ptp(body.places, axis=0)))
     moved = size / (min(body.law.lame_mu) * extent)
     pressed = max((float(body.on_terms @ np.array(bed.normal)) for bed in tool.beds), default=0.0)
-    if not body.elements.displacements.terms and pressed <= 0:
-        raise LargeError("the body does not settle on its support: the loads lift it off, and nothing else holds it")
+    if not body.elements.displacements.terms and pressed <= _PRESSES * size:
+        does = "lift it off" if pressed < -_PRESSES * size else "do not press it on"
+        raise LargeError(f"the body does not settle on its support: the loads {does}, and nothing else holds it")
     placed = placed_tool(body, tool, moved, away=extent)
     touched, limit = list[ContactSolution](), 0.0 if guess is None else _ROUGH
     path = Path(PathPoint(0.0, body.state))

@@ -226,10 +226,25 @@ class Candidates:
         pairs = self._near(higher)
         return higher._marked(pairs[active[pairs[:, 0]], 1])
 
-    def lowered(self, active: BoolArray, lower: "Candidates") -> BoolArray:
-        """Return the nodes of a ``lower`` degree around which most nodes are active."""
+    def lowered(self, active: BoolArray, lower: "Candidates", *, floats: bool = False) -> BoolArray:
+        """Return the nodes of a ``lower`` degree around which most nodes are active.
+
+        Of a body that ``floats`` without contact, each contact with active nodes has one of that degree, too.
+        """
         near, this = lower._near(self).T
-        return np.asarray(np.bincount(near, np.where(active[this], 1.0, -1.0), len(lower)) > 0)
+        votes = np.bincount(near, np.where(active[this], 1.0, -1.0), len(lower))
+        found = np.asarray(votes > 0)
+        for nodes in lower.of_contacts if floats else ():
+            around = near[active[this] & np.isin(near, nodes)]
+            if len(around) and not found[nodes].any():
+                found[around[votes[around].argmax()]] = True
+        return found
+
+    @property
+    def of_contacts(self) -> list[IntArray]:
+        """The nodes that each of several contacts may touch."""
+        assert self.contacts is not None
+        return [np.unique(self.facets[self.contacts == number]) for number in range(int(self.contacts.max()) + 1)]
 
     def _near(self, higher: "Candidates") -> IntArray:
         """Return pairs (k, 2) of a node and a neighbouring node of a ``higher`` degree, each once."""

@@ -3,17 +3,20 @@
 Force, area, slip, friction and torque follow from the nodes alone, whatever the body, the law or the load path.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
+
+import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.coulomb import rubbing_of
-from epsmesh.solve.contact.deformed import ContactSolution
 from epsmesh.solve.contact.geometry import Area, contact_area
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact_result import ContactResult
 
 
@@ -53,6 +56,19 @@ class SurfaceContact:
         """The contact area (m²) of the whole body, normal to the axis."""
         return float(2.0 ** len(self.mirrored) * self.area.value)
 
+    @property
+    def at_sharp_end(self) -> float:
+        """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
+        if not self.tool.is_sharp:
+            return 0.0
+        candidates, touched = self.candidates, self.touched
+        edge = np.flatnonzero(candidates.is_edge)
+        at_end = np.zeros(len(candidates), dtype=bool)
+        at_end[edge] = self.tool.ends_at(candidates.points[edge])
+        touching = touched.active[candidates.facets].any(axis=1)
+        areas = candidates.areas * touching
+        return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
+
     def result(self, sag: float, load_energy: float, shift: float = nan) -> ContactResult:
         """Return the whole contact; ``sag`` (m), ``load_energy`` (J) of the whole body and ``shift`` (m) are the
         effects of loads."""
@@ -62,3 +78,16 @@ class SurfaceContact:
         rubbing = rubbing_of(self.candidates, self.tool.friction, self.touched, self.coarse)
         torque = self.tool.torque(self.candidates.points, self.touched.forces)
         return found.with_friction(rubbing, torque, self.mirrored)
+
+
+def on_surface(
+    body: DeformedBody, tool: Tool, touched: ContactSolution, coarse: ContactSolution | None = None
+) -> SurfaceContact:
+    """Return contact with a body, where its candidates are; ``coarse`` is that from half as many load steps."""
+    part = body.part()
+    candidates = part.candidates
+    if not body.law.is_linear:
+        candidates = replace(candidates, points=part.of(body.positions()))
+    modulus, mirrored = candidates.from_regions(body.law.plane_moduli), body.elements.body.mirrored
+    coarse = None if coarse is None else part.solution(coarse)
+    return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse)

@@ -73,6 +73,8 @@ class DeformedBody:
         is_fixed = np.zeros(space.owned)
         is_fixed[space.prescribed_owned] = 1.0
         self.fixed = self._numbering.gather_vectors(is_fixed) > 0
+        # Whether a support or terms hold it, besides contacts.
+        self.is_held = bool(space.terms) or space.comm.allreduce(len(space.fixed_owned)) > 0
         self._is_current = False  # are the forces
         self._energy: float | None = None
         self.slope: float | None = None

@@ -31,8 +31,8 @@ class Tool:
     points (n, 3) to the probe pressed in by a depth (m) from the first touch, for contact at large displacements.
     ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
     ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis. ``beds`` are
-    the surfaces that the body rests on, ``begins`` (n) the nodes of all that touch before the tool does; None for all
-    above beds.
+    the surfaces that touch the body besides, ``begins`` (n) the nodes of all that touch before the tool does; None for
+    all above supports.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -45,6 +45,11 @@ class Tool:
     normal: Vector | None = None
     beds: tuple[Bed, ...] = ()
     begins: BoolArray | None = None
+
+    @property
+    def rubs(self) -> bool:
+        """Whether it, or what closes on the body with it, has friction; that of a support alone is no friction here."""
+        return self.friction > 0 or any(bed.friction > 0 and not bed.is_support for bed in self.beds)
 
     def at_rest(self, places: FloatArray) -> "Tool":
         """Return the tool of linear elasticity: gaps of nodes are those above their undeformed ``places``.
@@ -87,7 +92,7 @@ class Tool:
             found = self.distance(points, depth)
             return replace(found, gap=found.gap - change * self.normal[2])
 
-        return replace(self, distance=distance)
+        return replace(self, distance=distance, beds=tuple(bed.advanced(change) for bed in self.beds))
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.

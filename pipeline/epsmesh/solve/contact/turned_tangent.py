@@ -238,7 +238,7 @@ class IteratedTangent(TurnedTangent):
             held = self._numbering.normal_dofs(active, owned=True)
             if firm is not None:
                 held = np.union1d(held, self._numbering.all_dofs(firm, owned=True)).astype(np.int32)
-            levels = self._hierarchy.hold(active, firm)
+            levels = self._hierarchy.hold(active, firm, floats=constraint.floats)
             self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
             self._sets = sets
         if isinstance(self._solver, MixedSolver):

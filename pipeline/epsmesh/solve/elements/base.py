@@ -54,7 +54,8 @@ class HierarchicalEstimate:
     reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact,
     ``at_edge`` what the size of the elements at its edge has of it.
-    ``rest_bar`` is that on the area in which the body rests on a support that lets go.
+    ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
+    ``rest_force_bar`` that on the force of such a jaw.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
@@ -67,6 +68,7 @@ class HierarchicalEstimate:
     area_bar: float = nan
     at_edge: float = 0.0
     rest_bar: float = nan
+    rest_force_bar: float = nan
     friction_bar: float = 0.0
     is_solved: bool = False
 

@@ -23,8 +23,8 @@ from epsmesh.arrays import FloatArray
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.meridian import Grading
 from epsmesh.solve.contact.checks import check_support
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool
 from epsmesh.solve.contact.in_time import ContactIndentation
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 from epsmesh.solve.contact_result import ContactResult
 from epsmesh.solve.meridian.in_time import RelaxingHalfPlane
 from epsmesh.solve.meridian.large import LargeSolver, stopped

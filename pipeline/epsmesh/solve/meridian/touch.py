@@ -27,8 +27,9 @@ from epsmesh.solve.contact.contact_steps import (
     reach_contact,
     reach_contact_with_friction,
 )
-from epsmesh.solve.contact.deformed import ContactSolution, PlacedTool, first_set, solve_contact
+from epsmesh.solve.contact.deformed import first_set, solve_contact
 from epsmesh.solve.contact.surface import Neighbours, size_of
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 from epsmesh.solve.meridian.forms import Meshes
 from epsmesh.solve.meridian.punch import RoundTool
 from epsmesh.solve.meridian.signs import seen_from_above

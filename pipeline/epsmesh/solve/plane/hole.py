@@ -18,7 +18,7 @@ from epsmesh.mesh.meridian import meridian_mesh
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve import SolveError
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, reach_contact
-from epsmesh.solve.contact.deformed import PlacedTool
+from epsmesh.solve.contact.touching import PlacedTool
 from epsmesh.solve.meridian.forms import MeridianForms
 from epsmesh.solve.meridian.system import FreeSystem
 from epsmesh.solve.meridian.tissue import MeridianTissue

@@ -162,9 +162,9 @@ def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
 
 
 def has_terms(scene: Scene) -> bool:
-    """Return whether anything acts on the body besides its law, the tool and dead loads: terms, or a support that lets
-    go."""
-    return bool(terms_of(scene)) or scene.body.resting is not None
+    """Return whether anything acts on the body besides its law, the tool and dead loads: terms, a support that lets
+    go, or a second jaw."""
+    return bool(terms_of(scene)) or scene.body.resting is not None or scene.probe.jaw is not None
 
 
 def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_: True, **how: Any) -> Feature:
@@ -290,7 +290,14 @@ FEATURES: dict[str, Feature] = {
     "loads": Feature("load", is_loaded, ("body",)),
     "loads that move the surface": Feature("load", _moves_surface, ("body", "material", "probe")),
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
-    "terms": Feature("load", has_terms, ("body",)),
+    "terms": Feature("load", has_terms, ("body", "probe")),
+    "grasp": Feature("probe.together", lambda s: s.probe.jaw is not None),
+    "prescribed footprint of a grasp": Feature(
+        "probe.contact", lambda s: s.probe.jaw is not None and not s.probe.is_unilateral
+    ),
+    "jaw with a sharp edge": Feature(
+        "probe.contact", lambda s: s.probe.jaw is not None and s.probe.jaw.is_flat, write=lambda _: None
+    ),
     "support that lets go": Feature("body.support", lambda s: s.body.resting is not None),
     "prescribed footprint on a support that lets go": Feature(
         "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)

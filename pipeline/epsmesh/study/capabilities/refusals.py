@@ -14,6 +14,7 @@ from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
+from epsmesh.study.grasp import NOT_CLOSED
 from epsmesh.study.problems import Problems
 from epsmesh.study.schema import Material
 
@@ -38,7 +39,7 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
-_WITH_TERMS = "with springs or other terms in [load], a capsule, or a support that lets go"
+_WITH_TERMS = "with springs or other terms in [load], a capsule, a support that lets go, or two jaws"
 _NO_TERMS = "omit them"
 _TERMS: dict[str, type[BodyTerm]] = {**TERMS, "capsule": Capsule}
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
@@ -55,6 +56,7 @@ _NO_DERIVATIVES = {
     "given force": "is computed at given depths: give a depth, or omit it",
 }
 
+_GRASPED = f"{NOT_CLOSED}: omit it, or `together`"
 _LIFTS = "is not computed where tissue may lift off its support: omit it, or [body.support]"
 
 REFUSALS: tuple[Refusal, ...] = (
@@ -278,6 +280,27 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("support that lets go", "time steps", f"{_IN_STEPS}, in which tissue lifts off no support: {_STATIC}"),
     *(Refusal(name, "support that lets go", _LIFTS) for name in ("influence", "spread")),
+    # Two jaws: the contact of the second one is found with that of the tool.
+    Refusal(
+        "prescribed footprint of a grasp",
+        "grasp",
+        'must be "unilateral" in a grasp: the contacts of both jaws are found together',
+    ),
+    Refusal(
+        "jaw with a sharp edge",
+        "large displacements",
+        f'must have a rounded edge {_OF_LAW}, such as edge = "0.2 mm": at a sharp one the direction of the contact '
+        "force has no limit",
+    ),
+    Refusal("support that lets go", "grasp", "is not computed with two jaws: give body.fixed, or omit `together`"),
+    Refusal("grasp", "accuracy", "has two contacts, for which meshes of an accuracy are not made: give sizes"),
+    Refusal("loads", "grasp", f"would move the body before both jaws touch it: {_NO_LOADS}, or omit `together`"),
+    Refusal("region", "grasp", "is meshed from triangles, without a second jaw: use an inclusion, or omit `together`"),
+    Refusal("capsule on the surface", "grasp", _GRASPED),
+    Refusal("tension of the capsule", "grasp", _GRASPED),
+    Refusal("range of depths", "grasp", "its depths have meshes of their own in a grasp: omit it"),
+    Refusal("time steps", "grasp", f"{_IN_STEPS}, in which two jaws do not close: {_STATIC}"),
+    *(Refusal(name, "grasp", _GRASPED) for name in ("influence", "spread")),
     *(Refusal(name, other, reason) for name, kind in _TERMS.items() for other, reason in kind.EXCLUDES.items()),
     Refusal("half ball", "large displacements", f'must be "coarse", "linear", "free" or "fixed" {_OF_LAW}'),
 )

@@ -1,0 +1,82 @@
+"""Bodies that touch more than the tool: lift-off from a support, and two jaws."""
+
+from collections.abc import Iterator
+from math import pi, sqrt
+
+from mpi4py import MPI
+
+from epsmesh.plan.plan import make_plan
+from epsmesh.run.execute import compute
+from epsmesh.run.record import Record
+from epsmesh.study.read import parse
+from epsmesh.verify import Row, Section
+from tests.verification import known
+from tests.verification.sections import box, cylinder, mm, tissue
+
+_YOUNG, _POISSON = 10e3, 0.3
+# Of the integral equation, whose pressure has six terms, and of a point force for contact of a tenth of the thickness.
+_RECEDING = 5e-3
+# Of half of a body whose weight keeps it on a smooth plane: it bends the plane under the tool.
+_WEIGHT = 1e-3
+_LIGHT = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
+
+
+def contacts_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
+    """Yield the rows of several contacts; collective."""
+    yield _lift_off(comm)
+    if not quick:
+        yield from _grasps(comm)
+        yield _between_balls(comm)
+
+
+def _record(comm: MPI.Comm, body: Section, probe: Section | list[Section], mesh: Section, **more: Section) -> Record:
+    material = tissue(_POISSON, 1e-3 * _YOUNG) | more.pop("material", {})
+    study = parse({"body": body, "material": material, "probe": probe, "mesh": mesh, "solve": {"exact": False}, **more})
+    (record,) = compute(make_plan(study), comm).values()
+    return record
+
+
+def _sizes(rim: float, fine: float) -> Section:
+    return {"epsilon": "full", "fine": mm(fine), "coarse": mm(fine), "rim": mm(rim), "growth": 0.4}
+
+
+def _ball(radius: float, depth: float) -> Section:
+    return {"shape": "sphere", "radius": mm(radius), "depth": mm(depth), "contact": "unilateral"}
+
+
+def _jaws(tool: Section) -> list[Section]:
+    return [tool | {"together": "grasp"}, {"together": "grasp"}]
+
+
+def _lift_off(comm: MPI.Comm) -> Row:
+    """Radius at which a layer that is pressed at a point lifts off a smooth plane."""
+    thick, radius = 10.0, 40.0
+    body = cylinder(radius, thick, "none") | {"support": {"on": "bottom", "friction": 0}}
+    found = _record(comm, body, _ball(2, 0.1), _sizes(0.1, 3) | {"growth": 0.3})
+    touching = pi * (1e-3 * radius) ** 2 - found.largest["lift_off_area"]
+    value, bar = sqrt(touching / pi), found.largest["lift_off_area_error"] / touching / 2
+    reference = 1e-3 * thick * known.receding_radius()
+    return Row("layer on a smooth plane, edge of lift-off (m)", "3D", reference, known.KEER, value, bar, _RECEDING)
+
+
+def _grasps(comm: MPI.Comm) -> Iterator[Row]:
+    """A grasp that is symmetric about the middle, beside one tool on half of the body."""
+    disc = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": "unilateral"}
+    half = box(40, 40, 10, "none") | {"support": {"on": "bottom", "friction": 0}}
+    for name, tool in (("discs", disc), ("balls", _ball(5, 0.3))):
+        both = _record(comm, box(40, 40, 20, "none"), _jaws(tool), _sizes(0.1, 3))
+        one = _record(comm, half, tool, _sizes(0.1, 3), load=_LIGHT, material={"density": "1000 kg/m^3"})
+        yield Row(
+            f"block between two {name}", "3D", one.force, "half of it on a smooth plane",
+            both.force, both.force_error, one.force_error + _WEIGHT, both.message or one.message,
+        )  # fmt: skip
+
+
+def _between_balls(comm: MPI.Comm) -> Row:
+    """F on a block between two balls at the computed radius of contact: each is H. Hertz's."""
+    radius, depth = 20.0, 0.02
+    found = _record(comm, box(24, 24, 24, "none"), _jaws(_ball(radius, depth)), _sizes(0.04, 3))
+    modulus = _YOUNG / (1 - _POISSON**2)
+    force = 4 / 3 * modulus * found.contact_radius**3 / (1e-3 * radius)
+    bar = 3 * found.contact_radius_error
+    return Row("block between two balls, at the computed radius", "3D", force, "H. Hertz (1882)", found.force, bar)
