@@ -277,17 +277,17 @@ def _folded(corners: FloatArray, middle: FloatArray) -> np.ndarray:
     result = np.zeros(len(corners), dtype=bool)
     if curved.any():
         nodes = np.concatenate([corners[curved], middle[curved]], axis=1)
-        straight = _determinants(np.moveaxis(corners[curved, 1:] - corners[curved, :1], 1, 0))
+        straight = determinants(np.moveaxis(corners[curved, 1:] - corners[curved, :1], 1, 0))
         by_node = np.ascontiguousarray(nodes.transpose(1, 0, 2)).reshape(nodes.shape[1], -1)
         least = np.full(len(nodes), np.inf)
         for gradients in _gradients():
             columns = (gradients.T @ by_node).reshape(3, len(nodes), 3)
-            least = np.minimum(least, _determinants(columns))
+            least = np.minimum(least, determinants(columns))
         result[curved] = least < _LEAST_JACOBIAN * straight
     return result
 
 
-def _determinants(columns: FloatArray) -> FloatArray:
+def determinants(columns: FloatArray) -> FloatArray:
     """Return the triple products (n) of three vectors each, (3, n, 3)."""
     (a, b, c), (d, e, f), (g, h, i) = (part.T for part in columns)
     return np.asarray(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))

@@ -31,7 +31,7 @@ _ON_EDGES = 1e-6
 
 # A tetrahedron is flat if its volume is below this share of that of a box of its extent. In one mesh with a flat cell,
 # the strain in it was 80 times that beside it, F erred by more than its error bar, and iterations did not converge.
-_FLAT = 1e-5
+FLAT = 1e-5
 # Triangles of a surface overlap if their area exceeds its own by this factor: they are chords, and mostly smaller.
 _OVERLAP = 1.2
 # If gmsh fails, a round side gets the resolution of a side with the body's extent divided by this.
@@ -275,7 +275,7 @@ def flat_cells(points: FloatArray, cells: IntArray) -> BoolArray:
     """Return a mask of flat tetrahedra; a mesh with one of them is unusable."""
     corners = points[cells]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1])
-    return np.asarray(~(np.abs(volume) > _FLAT * np.ptp(corners, axis=1).max(axis=1) ** 3))
+    return np.asarray(~(np.abs(volume) > FLAT * np.ptp(corners, axis=1).max(axis=1) ** 3))
 
 
 def orient(points: FloatArray, cells: IntArray) -> IntArray:

@@ -29,6 +29,9 @@ _SOLVE = {1: (0.04, 0.75), 2: (0.165, 0.75), 3: (0.4, 0.8)}
 _BAR = {1: (0.03, 0.8), 2: (0.105, 0.8), 3: (0.3, 0.85)}
 # Tetrahedra above which time grows in proportion to them. Measured from 20,000 to two million.
 _PROPORTIONAL = {"mesh": 27_000.0, "solve": 5_000.0, "bar": 5_000.0}
+# Factors on these of refined meshes, which are made by another program, and are levels of multigrid: measured from
+# 60,000 to two million.
+_REFINED = {"mesh": 0.42, "solve": 0.75, "bar": 1.0}
 # Large displacements or terms, all load steps and Newton iterations together; their error bar. Factor of mixed
 # elements.
 _LARGE, _MIXED_LARGE = {"solve": (9.7, 1.1), "bar": (0.48, 0.8)}, 2.5
@@ -172,14 +175,15 @@ def _memory(solve: Solve) -> float:
     planes = model_planes(solve.case) if apart else solve.mirrors
     fewer = refinement.cells(solve.case) / estimate.cells(solve.case)
     share, of_bar = fewer * 0.5 ** len(solve.mirrors), fewer * 0.5 ** len(planes)
-    return estimate.peak_memory(solve.case, share, of_bar, reduced=solve.reduced)
+    free = refinement.is_matrix_free(solve.case)
+    return estimate.peak_memory(solve.case, share, of_bar, reduced=solve.reduced, matrix_free=free)
 
 
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
     It names element, degree, several movements, unilateral contact, friction, several materials, a shape without load,
-    the number of time steps, and a curved or folded body.
+    a refined mesh, the number of time steps, and a curved or folded body.
     """
     case, way = solve.case, solve.way
     if solve.axisymmetric:
@@ -189,6 +193,7 @@ def kind_of(solve: Solve) -> str:
     words += _TOUCH.get(way.constraint, [])
     words += ["regions"] if case.body.regions else []
     words += ["unloaded"] if case.imaged else []
+    words += ["refined"] if refinement.is_refined(case) else []
     words += _steps(case)
     if not isinstance(case.body, Layered):
         folds = case.body.curvature > _FOLDED * _OF_BALL * case.body.volume ** (1 / 3)
@@ -292,9 +297,10 @@ def _prior(stage: str, kind: str) -> _Numbers:
         return log(_MERIDIAN * (static + _STEP_OF_MERIDIAN * steps)), 0.0, 0.0
     degree, *words = words
     steps *= _RUBBING_STEP if "friction" in words else 1.0
+    refined = _REFINED[stage] if "refined" in words else 1.0
     if stage == "mesh":
         seconds, power = _MESH
-        return log(seconds * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
+        return log(seconds * refined * _MESHED.get(words[-1] if words else "", 1.0)), power, 0.0
     if element not in ("displacement", "mixed"):  # the names of laws: Newton's method
         seconds, power = _LARGE[stage]
         if stage == "solve":
@@ -309,6 +315,7 @@ def _prior(stage: str, kind: str) -> _Numbers:
     seconds *= (1 + _MOVEMENT * (movements - 1)) * (_MIXED if element == "mixed" else 1.0)
     seconds *= _LAYERED if "regions" in words else 1.0
     seconds *= _SEARCH if stage == "solve" and "found" in words and (stepped or not rubs) else 1.0
+    seconds *= refined
     if stepped:
         seconds = seconds * steps + (_FRICTION[0] if rubs else 0.0)
     return log(seconds), power, 0.0 if element == "mixed" or rubs else _LOCKING

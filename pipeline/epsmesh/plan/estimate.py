@@ -22,6 +22,8 @@ _OF_BAR = {
     (True, "displacement"): {2: 600, 3: 600, 4: 600},
     (True, "mixed"): {3: 1000, 4: 1000},
 }
+# Factor on these without a matrix of degree 1 (benchmarks/results/huge.md).
+_MATRIX_FREE = 0.7
 # The same of an error bar for which large contact is found again, in units of that with the area known; and of the
 # stresses, strains and history at the points of large displacements in time steps, for each point of a cell.
 _FOUND_AGAIN, _OF_POINT, _POINTS = 2.3, 1400, {1: 4, 2: 14, 3: 24, 4: 45}
@@ -155,32 +157,44 @@ def dofs(count: float, degree: int) -> float:
     return _DOFS_PER_CELL[degree] * count
 
 
-def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool) -> float:
-    """Return the estimated bytes of a solve, all ranks together; ``direct``: by a factorisation."""
+def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool, matrix_free: bool = False) -> float:
+    """Return the estimated bytes of a solve, all ranks together; ``direct``: by a factorisation.
+
+    ``matrix_free``: without a matrix of degree 1, see :func:`.refinement.is_matrix_free`.
+    """
     if direct or way.is_factorised:
         # The fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs.
         return _BASE + _OF_FACTOR[degree] * (dofs / 50_000) ** (1 / 3) * dofs
     followed = _OF_POINT * _POINTS[degree] / _DOFS_PER_CELL[degree] if way.in_time and way.is_nonlinear else 0.0
-    return _BASE + (_BYTES_PER_DOF[way.is_nonlinear, way.element][degree] + followed) * dofs
+    factor = _MATRIX_FREE if matrix_free else 1.0
+    return _BASE + (factor * _BYTES_PER_DOF[way.is_nonlinear, way.element][degree] + followed) * dofs
 
 
-def error_bar_memory(dofs: float, degree: int, way: Way = PLAIN) -> float:
+def error_bar_memory(dofs: float, degree: int, way: Way = PLAIN, *, matrix_free: bool = False) -> float:
     """Return the estimated bytes of an error bar: a solve of one degree more than that of ``dofs`` unknowns."""
     growth = _DOFS_PER_CELL[degree + 1] / _DOFS_PER_CELL[degree]
     growth *= _FOUND_AGAIN if way.is_found and way.is_nonlinear else 1.0
+    growth *= _MATRIX_FREE if matrix_free else 1.0
     return _BASE + _OF_BAR[way.is_nonlinear, way.element][degree + 1] * growth * dofs
 
 
-def peak_memory(case: Case, share: float = 1.0, of_bar: float | None = None, *, reduced: bool = False) -> float:
+def peak_memory(
+    case: Case,
+    share: float = 1.0,
+    of_bar: float | None = None,
+    *,
+    reduced: bool = False,
+    matrix_free: bool = False,
+) -> float:
     """Return the estimated bytes of a case with its error bar, within a factor of 1.5; see :func:`case_memory`.
 
     ``of_bar`` is the part of the body for the error bar, if it differs; ``reduced`` cases have a reduced basis.
     """
     degree = case.mesh.degree
     count = dofs((share if of_bar is None else of_bar) * cells(case), degree)
-    enriched = error_bar_memory(count, degree, case.way)
+    enriched = error_bar_memory(count, degree, case.way, matrix_free=matrix_free)
     basis = basis_memory(dofs(share * cells(case), degree), degree) if reduced else 0.0
-    return _LOADED + max(case_memory(case, share), enriched) + basis
+    return _LOADED + max(case_memory(case, share, matrix_free=matrix_free), enriched) + basis
 
 
 def basis_memory(dofs: float, degree: int) -> float:
@@ -193,11 +207,12 @@ def on_ranks(memory: float, ranks: int) -> float:
     return memory + (ranks - 1) * _RANK
 
 
-def case_memory(case: Case, share: float = 1.0) -> float:
+def case_memory(case: Case, share: float = 1.0, *, matrix_free: bool = False) -> float:
     """Return the estimated bytes of meshing and solving a case, within about a factor of two.
 
-    ``share`` is the modelled part of the body.
+    ``share`` is the modelled part of the body; ``matrix_free``: see :func:`solving_memory`.
     """
     count, degree = share * cells(case), case.mesh.degree
-    solving = solving_memory(dofs(count, degree), degree, case.way, direct=case.solve.method == "direct")
+    direct = case.solve.method == "direct"
+    solving = solving_memory(dofs(count, degree), degree, case.way, direct=direct, matrix_free=matrix_free)
     return max(_BASE + _BYTES_PER_CELL * count, solving)

@@ -49,6 +49,11 @@ def refinements(case: Case) -> int:
     return _refinements(_Scene(case.body, case.probe, case.mesh, case)) if case.mesh.degree > 1 else 0
 
 
+def is_matrix_free(case: Case) -> bool:
+    """Return whether multigrid assembles no matrix of degree 1: coarser meshes are its levels, see ``Spaces``."""
+    return is_refined(case) and not (case.terms or case.way.is_found or case.way.is_nonlinear)
+
+
 def cells(case: Case) -> float:
     """Return the estimated number of tetrahedra of a case, of which a refined mesh has fewer."""
     return estimate.cells(case) * _FEWER[refinements(case)]

@@ -9,6 +9,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.of_case import meridian_of
 from epsmesh.plan import estimate
+from epsmesh.plan.refinement import is_matrix_free
 from epsmesh.plan.symmetry import slides_across
 from epsmesh.plan.thin import cause
 from epsmesh.run.far_field import far_field_of, far_field_seconds
@@ -92,8 +93,9 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
     """Return the estimated bytes of a solve of ``case`` with ``dofs`` unknowns, and of its error bar."""
     degree, direct = case.mesh.degree, is_direct(case.solve.method, dofs, DIRECT_LIMIT[case.mesh.degree])
-    solving = estimate.solving_memory(dofs, degree, case.way, direct=direct)
-    return solving, estimate.error_bar_memory(dofs, degree, case.way)
+    free = is_matrix_free(case)
+    solving = estimate.solving_memory(dofs, degree, case.way, direct=direct, matrix_free=free)
+    return solving, estimate.error_bar_memory(dofs, degree, case.way, matrix_free=free)
 
 
 def memory_of_basis(case: Case, dofs: int) -> float:
