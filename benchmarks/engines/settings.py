@@ -44,8 +44,6 @@ SCANS = MappingProxyType(
             *grid(size=[COARSE], stiffness=[1e4], iterations=[50], damping=[0.0, 100.0]),
             *grid(size=[COARSE], stiffness=[1e4], iterations=[10], tick=[1 / 2400]),
             *grid(size=[FINE], stiffness=[1e2, 1e3, 1e4], iterations=[10]),
-            *grid(size=[FINE], stiffness=[1e4], iterations=[50]),
-            *grid(size=[FINE], stiffness=[1e3], iterations=[10], tick=[1 / 2400]),
         ),
         "PyBullet": (
             *grid(size=[COARSE], tick=[1e-3], scale=[10.0, 100.0], margin=[1e-4, 1e-5]),
