@@ -73,6 +73,19 @@ def test_a_capsule_within_the_body_holds_it_no_more_than_the_support_does(tensio
 
 
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
+def test_friction_of_the_support_is_between_none_and_sticking(material):
+    smooth, least, some, more, most, stuck = (
+        one(probe=BALL, body=on(friction), material=material) for friction in (0, 1e-3, 0.1, 0.3, 2.0, "stick")
+    )
+    assert smooth.force < least.force < some.force < more.force < most.force
+    assert least.force == pytest.approx(smooth.force, rel=1e-4)
+    assert most.force == pytest.approx(stuck.force, rel=1e-7)
+    assert more.balance < 1e-8
+    lifted = [each.largest["lift_off_area"] for each in (smooth, least, some, more)]
+    assert lifted == sorted(lifted, reverse=True)
+
+
+@pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_tool_is_that_on_a_fixed_body(material):
     fixed, rests = (one(probe=BALL | {"friction": 0.3}, body=body, material=material) for body in ({}, on("stick")))
     # Both searches end where Coulomb's law holds within a tolerance, which is 1e-4 of F on some meshes.
@@ -141,7 +154,7 @@ def test_a_body_that_floats_fails_with_what_does_not_hold_it(changes, said):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"body": on(0.3)}, 'must be 0 or "stick"'),
+        ({"body": on(0.3), **HEAVY}, 'must be 0 or "stick" with loads'),
         ({"body": on() | {"fixed": "bottom"}}, 'must be "none" with [body.support]'),
         ({"body": on(), "probe": {"contact": "bonded"}}, "found together"),
         ({"body": on("stick"), "probe": BALL | {"history": {"ramp": "1 s", "hold": "1 s"}}}, "lifts off no support"),

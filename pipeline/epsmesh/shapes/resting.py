@@ -1,22 +1,11 @@
 """A support that lets go: a rigid surface on which a body rests, and off which it may lift."""
 
-from math import inf
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
 from epsmesh.shapes.friction import Friction
 from epsmesh.shapes.section import Section, Words
-
-
-def _smooth_or_rough(friction: float) -> float:
-    if 0 < friction < inf:
-        raise PydanticCustomError(
-            "not_supported",
-            'must be 0 or "stick": how tissue slides while the body settles and is pressed is not computed',
-        )
-    return friction
 
 
 class Resting(Section):
@@ -34,11 +23,9 @@ class Resting(Section):
     ] = "unilateral"
     friction: Annotated[
         Friction,
-        AfterValidator(_smooth_or_rough),
         Words(
-            "Friction between tissue and support: 0, or stick: tissue that touches it does not slide. The dataset "
-            "writes stick as infinity.",
-            '"stick"',
-            takes='0 | "stick"',
+            "Coulomb's coefficient of friction between tissue and support, or stick: tissue that touches it does not "
+            "slide. The dataset writes stick as infinity.",
+            '[0.0, 0.3, "stick"]',
         ),
     ] = 0.0

@@ -58,7 +58,9 @@ def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None
     if not values[0] > _FREE * max(abs(values[-1]), size):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
         if rests:
-            what, hold = ("its support lets", "give [body.support] friction") if space.conditions.released else _JAWS
+            what, hold = (
+                ("its support lets", 'give [body.support] friction = "stick"') if space.conditions.released else _JAWS
+            )
             raise SolveError(
                 f"the body floats: {what} it {free}, and nothing else prevents that; {hold}, add a term of [load] that "
                 "prevents it, or place the tool in the planes of symmetry"

@@ -48,8 +48,8 @@ class Tool:
 
     @property
     def rubs(self) -> bool:
-        """Whether it, or what closes on the body with it, has friction; that of a support alone is no friction here."""
-        return self.friction > 0 or any(bed.friction > 0 and not bed.is_support for bed in self.beds)
+        """Whether it, or what touches the body besides, has friction; a support that only sticks has none here."""
+        return self.friction > 0 or any(bed.friction > 0 and not bed.sticks for bed in self.beds)
 
     def at_rest(self, places: FloatArray) -> "Tool":
         """Return the tool of linear elasticity: gaps of nodes are those above their undeformed ``places``.

@@ -299,6 +299,11 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: s.probe.jaw is not None and s.probe.jaw.is_flat, write=lambda _: None
     ),
     "support that lets go": Feature("body.support", lambda s: s.body.resting is not None),
+    "support on which tissue slides": Feature(
+        "body.support.friction",
+        lambda s: s.body.resting is not None and 0 < s.body.resting.friction < inf,
+        where=lambda s: ("body.support.friction", s.body.resting.friction) if s.body.resting else None,
+    ),
     "prescribed footprint on a support that lets go": Feature(
         "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)
     ),

@@ -273,6 +273,14 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "has an edge where tissue lifts off, which meshes for an accuracy do not refine: give sizes",
     ),
+    *(
+        Refusal(
+            "support on which tissue slides",
+            preloaded,
+            f'must be 0 or "stick" with {what}: how tissue slides while the body settles is not computed',
+        )
+        for preloaded, what in (("loads", "loads"), ("tension of the capsule", "a capsule that is stretched before"))
+    ),
     Refusal(
         "capsule on the surface",
         "support that lets go",
