@@ -160,7 +160,7 @@ def dofs(count: float, degree: int) -> float:
 def solving_memory(dofs: float, degree: int, way: Way = PLAIN, *, direct: bool, matrix_free: bool = False) -> float:
     """Return the estimated bytes of a solve, all ranks together; ``direct``: by a factorisation.
 
-    ``matrix_free``: without a matrix of degree 1, see :func:`.refinement.is_matrix_free`.
+    ``matrix_free``: without a matrix of degree 1, see :func:`.is_matrix_free`.
     """
     if direct or way.is_factorised:
         # The fill of a 3D factorisation grows like dofs^(4/3); _OF_FACTOR is for 50,000 dofs.

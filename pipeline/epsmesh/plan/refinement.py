@@ -50,7 +50,10 @@ def refinements(case: Case) -> int:
 
 
 def is_matrix_free(case: Case) -> bool:
-    """Return whether multigrid assembles no matrix of degree 1: coarser meshes are its levels, see ``Spaces``."""
+    """Return whether multigrid has coarser meshes as levels, and therefore assembles no matrix of degree 1.
+
+    Of nonlinear tissue other vectors and tangents set the peak of memory.
+    """
     return is_refined(case) and not (case.terms or case.way.is_found or case.way.is_nonlinear)
 
 
