@@ -238,7 +238,7 @@ def _singular_rim(mesh: MeshArrays, scene: Scene) -> IntArray:
     """Return the points of the rim at which the displacement goes like r^½: of a second jaw it may, or not."""
     if scene.jaw is None:
         return mesh.rim
-    within = [mesh.facets[name].ravel() for name, (tool, _) in scene.tools.items() if tool.has_singular_edge]
+    within = [mesh.facets[name].ravel() for name, tool in scene.tools.items() if tool.has_singular_edge]
     return np.intersect1d(mesh.rim, np.concatenate(within))
 
 

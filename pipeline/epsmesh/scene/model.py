@@ -66,15 +66,14 @@ class Scene:
     jaw_segments: int = 0
 
     @property
-    def tools(self) -> dict[str, tuple[Probe, int]]:
-        """The tool, and an opposite jaw if any, by their groups; with the number of edges along round rims."""
-        jaw = {} if self.jaw is None else {JAW: (self.jaw, self.jaw_segments)}
-        return {PROBE: (self.probe, self.rim_segments)} | jaw
+    def tools(self) -> dict[str, Probe]:
+        """The tool, and an opposite jaw if any, by their groups."""
+        return {PROBE: self.probe} | ({} if self.jaw is None else {JAW: self.jaw})
 
     @property
     def has_quarter_points(self) -> bool:
         """Whether elements at the rim have quarter points."""
-        return any(tool.has_singular_edge for tool, _ in self.tools.values()) and not self.rim_folds
+        return any(tool.has_singular_edge for tool in self.tools.values()) and not self.rim_folds
 
     @property
     def frame(self) -> Frame:
