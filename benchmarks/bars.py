@@ -33,7 +33,7 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.plan.steps import Solve
 from epsmesh.study.read import read_mapping
 from tests.isolated import isolated
-from tests.pairs import FEATURES, Study
+from tests.pairs import FEATURES, Study, tools
 from tests.same.outcome import Outcome, solve
 from tests.same.quantities import rewritten, times
 from tests.same.scenes import draw, seconds, write_files
@@ -138,7 +138,7 @@ def truths(study: Study, bar: float) -> Iterator[Study]:
     kept = {key: mesh[key] for key in ("epsilon", "outside") if key in mesh and not whole}
     low, high = _ACCURACIES
     # The cost of friction in three dimensions grows with the cube of the nodes in contact.
-    for finer in (_FINER, _FINER / 2) if study["probe"].get("friction") is None else (4,):
+    for finer in (_FINER, _FINER / 2) if tools(study)[0].get("friction") is None else (4,):
         yield study | {"mesh": {"accuracy": f"{100 * min(max(bar / finer, low), high):.3g} %"} | kept}
     if "rim" in mesh:
         sizes = {key: times(mesh[key], factor) for key, factor in {"rim": 0.2, "fine": 0.5, "coarse": 0.6}.items()}
@@ -209,7 +209,7 @@ def limit_processor(most_seconds: int = _LIMIT) -> float:
 
 
 def _main(study: Study) -> str:
-    return "depth" if "force" in study["probe"] else "force"
+    return "depth" if "force" in tools(study)[0] else "force"
 
 
 def relative_bar(found: Outcome, name: str) -> float:

@@ -20,7 +20,7 @@ from pathlib import Path
 from benchmarks.bars import Row, campaign, scene
 from benchmarks.tables import markdown
 from epsmesh.run.record import UNFORESEEN
-from tests.pairs import Study, pieces
+from tests.pairs import Study, pieces, tools
 from tests.same.quantities import number_of, rewritten, scaled, times
 from tests.same.scenes import seconds
 
@@ -47,14 +47,17 @@ def _jump(study: Study, dice: Dice) -> None:
 
 
 def _depth(study: Study, dice: Dice) -> None:
-    if "depth" in study["probe"]:
-        study["probe"]["depth"] = times(study["probe"]["depth"], 10 ** dice.uniform(-9, 1))
+    factor = 10 ** dice.uniform(-9, 1)
+    for tool in tools(study):
+        if "depth" in tool:
+            tool["depth"] = times(tool["depth"], factor)
 
 
 def _tool(study: Study, dice: Dice) -> None:
     factor = 10 ** dice.uniform(-1.9, 0.6)
-    kept = {key: study["probe"][key] for key in ("at", "axis", "path") if key in study["probe"]}
-    study["probe"] = scaled({"probe": study["probe"]}, factor, 1.0)["probe"] | kept
+    for tool in tools(study):
+        kept = {key: tool[key] for key in ("at", "axis", "path") if key in tool}
+        tool.update(scaled({"probe": tool}, factor, 1.0)["probe"] | kept)
     if "rim" in study["mesh"]:
         study["mesh"]["rim"] = times(study["mesh"]["rim"], factor)
 

@@ -37,7 +37,7 @@ from benchmarks.grids import Estimate, grid_convergence_index, median_interval
 from benchmarks.tables import markdown, options
 from epsmesh.study.read import read_mapping
 from epsmesh.study.way import Constraint, Motion
-from tests.pairs import Study
+from tests.pairs import Study, tools
 from tests.same.outcome import Outcome, solve
 from tests.same.quantities import times
 from tests.same.scenes import seconds
@@ -72,9 +72,9 @@ def unfit(study: Study, classes: dict[str, str]) -> str:
     """Return why a scene is not of this comparison; empty if it is."""
     if "accuracy" in study["mesh"]:
         return "meshes by accuracy"
-    if {"history", "relaxation"} & classes.keys() or "insertion" in study["probe"]:
+    if {"history", "relaxation"} & classes.keys() or "insertion" in tools(study)[0]:
         return "not static"
-    return "its force is given" if "force" in study["probe"] else ""
+    return "its force is given" if "force" in tools(study)[0] else ""
 
 
 def judged(seed: int, folder: Path, drawn: Drawn) -> Row:

@@ -73,6 +73,12 @@ def _body(**keys: Any) -> Callable[[Study], None]:
     return change
 
 
+def tools(study: Study) -> list[dict[str, Any]]:
+    """Return the tools of a study: one, or the two jaws of a grasp, of which the second may leave out keys."""
+    probe = study["probe"]
+    return probe if isinstance(probe, list) else [probe]
+
+
 def _probe(**keys: Any) -> Callable[[Study], None]:
     def change(study: Study) -> None:
         del study["probe"]["radius"]

@@ -2,7 +2,7 @@
 
 import copy
 import random
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from math import inf
 from pathlib import Path
 
@@ -38,15 +38,17 @@ _FINER = {"fine": 1 / 3, "coarse": 0.5, "rim": 0.2}
 _ROUND = 0.7
 
 
-def draw(seed: int, folder: Path, *, fine: bool = False) -> tuple[Study, tuple[str, ...]]:
+def draw(
+    seed: int, folder: Path, *, fine: bool = False, without: Collection[str] = ()
+) -> tuple[Study, tuple[str, ...]]:
     """Return the study of a seed, and the names of its features; the same seed gives the same study.
 
     ``folder`` has the files of :func:`write_files`. What the study's checks refuse is drawn again. ``fine`` scenes have
-    small elements, and many of them a meridian.
+    small elements, and many of them a meridian. Features ``without`` are not drawn.
     """
     dice = random.Random(f"same {seed}")
     longest = dice.choice((_SHORT, _SHORT, _SHORT, _LONG))
-    for features, study in _drawn(dice):
+    for features, study in _drawn(dice, _NO_SCENES | {*without}):
         if fine:
             _refine(study, dice)
         if seconds(study, folder) <= longest:
@@ -73,9 +75,9 @@ def seconds(study: Study, folder: Path) -> float:
         return inf
 
 
-def _drawn(dice: random.Random) -> Iterator[tuple[tuple[Feature, ...], Study]]:
+def _drawn(dice: random.Random, without: Collection[str]) -> Iterator[tuple[tuple[Feature, ...], Study]]:
     while True:
-        features = _features(dice)
+        features = _features(dice, without)
         study = copy.deepcopy(BASE)
         study["material"].update(young=f"{dice.uniform(2, 60):.3g} kPa", poisson=dice.choice((0.3, 0.35, 0.42, 0.45)))
         study["probe"]["depth"] = f"{dice.uniform(0.1, 0.4):.2g} mm"
@@ -86,7 +88,7 @@ def _drawn(dice: random.Random) -> Iterator[tuple[tuple[Feature, ...], Study]]:
         yield features, study
 
 
-def _features(dice: random.Random) -> tuple[Feature, ...]:
+def _features(dice: random.Random, without: Collection[str]) -> tuple[Feature, ...]:
     """Return some features of different slots, in the order in which their changes are made."""
     count = dice.choice(_FEATURES)
     chosen: dict[str, Feature] = {}
@@ -94,7 +96,7 @@ def _features(dice: random.Random) -> tuple[Feature, ...]:
         if len(chosen) == count:
             break
         is_drawn = dice.randrange(_SLOW.get(feature.name, 1)) == 0
-        if is_drawn and feature.name not in _NO_SCENES and feature.slot not in chosen:
+        if is_drawn and feature.name not in without and feature.slot not in chosen:
             chosen[feature.slot] = feature
     return tuple(feature for feature in FEATURES if chosen.get(feature.slot) is feature)
 
