@@ -51,12 +51,12 @@ def test_an_unknown_truth_is_not_counted():
 @pytest.mark.nightly
 def test_a_scene_is_judged_and_a_campaign_goes_on(tmp_path, capsys):
     words = ["--output", str(tmp_path), "--seeds"]
-    assert bars.main([*words, "2:3"]) == 0
+    assert bars.main([*words, "7:8"]) == 0
     (line,) = (tmp_path / "bars-calibration.jsonl").read_text().splitlines()
     assert 0 < json.loads(line)["errors"]["force"] < 1
     log = tmp_path / "bars-calibration.jsonl"
-    log.write_text(line.replace('"seed": 2', '"seed": 3') + "\n")
-    assert bars.main([*words, "3:4"]) == 0
+    log.write_text(line.replace('"seed": 7', '"seed": 8') + "\n")
+    assert bars.main([*words, "8:9"]) == 0
     assert len(log.read_text().splitlines()) == 1
     assert "| all | 1 | 1 |" in capsys.readouterr().out
 
