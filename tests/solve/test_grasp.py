@@ -13,6 +13,8 @@ from tests.cases import NO_SIZES, raw, refusal, solve
 
 DISC: dict[str, Any] = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": "unilateral"}
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.3 mm", "contact": "unilateral"}
+# A ball without a depth.
+NEAR = {key: value for key, value in BALL.items() if key != "depth"}
 BLADE: dict[str, Any] = {
     "shape": "blade", "length": "10 mm", "width": "3 mm", "depth": "0.1 mm", "contact": "unilateral",
 }  # fmt: skip
@@ -133,6 +135,18 @@ def test_the_dataset_has_both_jaws():
         assert (dataset[name] > 0).all()
 
 
+def test_jaws_close_to_a_force():
+    """The depth at the force is the one at which jaws that close by it have the force."""
+    plan = make_plan(parse(grasp(NEAR | {"force": "10 mN"}, {"radius": "3 mm"})))
+    found = build(plan, compute(plan, MPI.COMM_SELF))
+    depth = float(found["depth"])
+    again = closed(BALL | {"depth": f"{depth} m"}, {"radius": "3 mm"})
+    assert float(found["jaw_force"]) == pytest.approx(10e-3, rel=1e-6)  # nothing else holds the body
+    # Each depth has a mesh of its own.
+    assert again.force == pytest.approx(10e-3, rel=again.force_error)
+    assert 0 < float(found["depth_error"]) < 0.1 * depth
+
+
 def test_a_body_that_jaws_do_not_hold_fails_and_says_along_which_axis():
     found = closed(BALL | {"at": ["3 mm", "0 mm"]})
     assert found.status == "failed"
@@ -155,6 +169,9 @@ def test_a_body_that_jaws_do_not_hold_fails_and_says_along_which_axis():
         (grasp(BALL, {"shape": "hook"}), "unknown shape"),
         (grasp(BALL, {"shape": "disc"}), "radius"),
         (grasp(BALL, {"colour": "red"}), "unknown key"),
+        (grasp(NEAR | {"force": "1 N"}, {"depth": "1 mm"}), "probe[2].depth"),
+        (grasp(NEAR, {"depth": "1 mm", "force": "1 N"}), "probe[2].force"),
+        (grasp(BALL | {"force": "1 N"}), "give one of both"),
         (grasp(BALL | {"depth": "12 mm"}), "of both jaws together"),
         (grasp(BALL | {"at": SIDE}, body={"fixed": "none", "support": {"on": "bottom"}}), "with two jaws"),
         (grasp(BALL, body={"fixed": "bottom"}), "support"),

@@ -21,6 +21,8 @@ from epsmesh.units import canonical
 _ENDED = "load steps end there"
 # Quantities with a bar that grow with the depth, no faster than F.
 _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
+# Forces of a second jaw, among the further numbers of a record.
+_FORCES_OF_JAW = ("jaw_force", *(f"jaw_force_vector_{axis}" for axis in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,10 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     energy = found.times * found.depth / found.solved * record.energy
     force = canonical(found.times * record.force)
     off = max(found.exponent, 1.0) * found.error / found.depth
-    return replace(_barred(record, off), force=force, force_vector=(x, y, z), energy=energy)
+    barred = _barred(record, off)
+    of_jaw = {name: found.times * barred.largest[name] for name in barred.largest if name in _FORCES_OF_JAW}
+    largest = barred.largest | of_jaw
+    return replace(barred, force=force, force_vector=(x, y, z), energy=energy, largest=largest)
 
 
 def _barred(record: Record, off: float) -> Record:

@@ -33,8 +33,9 @@ def gives_force(probe: Probe) -> bool:
 
 
 def at_depth(probe: Probe, depth: float) -> Probe:
-    """Return the probe at a ``depth`` (m)."""
-    return probe.model_copy(update={"depth": depth})
+    """Return the probe at a ``depth`` (m), by which a second jaw closes, too."""
+    found = probe.model_copy(update={"depth": depth})
+    return found if probe.jaw is None else found.grasping(at_depth(probe.jaw, depth))
 
 
 def expected_depth(body: Body, material: Material, probe: Probe) -> float:
@@ -71,11 +72,13 @@ def largest_depth(body: Body, probe: Probe) -> float:
         thickness = body.thickness(probe.frame_on(body))
     except PlaceError:  # which its checks tell
         thickness = 1.0
+    thickness /= 1 if probe.jaw is None else 2
     least, most = _bounds(probe, _THROUGH * thickness)
 
     def is_allowed(depth: float) -> bool:
-        found = Problems()
-        at_depth(probe, depth).check(found)
+        found, deeper = Problems(), at_depth(probe, depth)
+        for tool in (deeper, deeper.jaw or deeper):
+            tool.check(found)
         return not found.errors
 
     def fits(depth: float) -> bool:

@@ -12,7 +12,7 @@ from epsmesh.study.swept import placed, sweeps
 # The second table, within the first.
 JAW = "jaw"
 # What a tool alone may have in place of a depth.
-_NOT_TOGETHER = ("force", "insertion")
+_NOT_TOGETHER = ("insertion",)
 NOT_CLOSED = "is not computed where two jaws close"
 # Keys of the first jaw alone: both have the same place, axis and friction.
 _OF_FIRST = ("at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths")
@@ -49,6 +49,10 @@ def _is_sane(first: dict[str, Any], second: dict[str, Any], where: str, problems
     wrong = [key for key in second if key in _OF_FIRST]
     for key in wrong:
         problems.error(f"{where}.{key}", second[key], "is that of the first jaw, which has it alone: omit it here")
+    if "force" in first and "depth" in second:
+        told = "is computed with the `force` of the first jaw: both close by the same depth. Omit it here"
+        problems.error(f"{where}.depth", second["depth"], told)
+        return False
     swept = [key for key, value in second.items() if isinstance(value, list) and key not in ("direction", "axes")]
     for key in swept:
         told = "is a list: sweep it in the first table, whose keys the second one has if it leaves them out"

@@ -35,7 +35,7 @@ def read_section(name: str, raw: Any, problems: Problems) -> tuple[list[Axis], t
     if name not in SINGLE:
         raw = without_ranges(raw, name, problems)
     if name == "probe":
-        raw = _reaching(with_jaws(raw, problems), problems)
+        raw = with_jaws(_reaching(raw, problems), problems)
         raw, way = _walked(raw, problems)
         axes, variants = _read_tables(name, raw, problems)
         return (_axes_of(way, axes) if way else axes), variants
