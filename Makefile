@@ -123,7 +123,7 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision
 	$(PYTHON) -m benchmarks.drag --minutes 5
-	$(EPSMESH) run studies/speedup.toml --fresh
+	$(PYTHON) -m benchmarks.speedup
 
 peers: setup ## compare with NGSolve, scikit-fem and CalculiX the time for a true error, with NGSolve error bars (on an idle machine)
 	@scripts/peers.sh

@@ -43,16 +43,14 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
     ``folded`` replaces every ε beyond the body by the full order; ``scaled`` leaves out the inputs that the force is
     proportional to. Each timed case has a key of its own.
     """
-    head, tail, half_width = _scene_texts(case, scaled)
+    head, tail, last, half_width = _scene_texts(case, scaled)
     parts = [
         *head,
         "" if half_width is None else _mesh_text(case.mesh, folded and case.is_full, half_width, case.way.element),
         text_of(case.solve, ("timing", "repeats", "exact", "influence")),
         *tail,
         *(["influence, decays in cells"] if case.solve.influence else []),
-        *_spread_text(case),
-        *map(_output_text, case.outputs),
-        *_rim_text(case),
+        *last,
     ]
     if case.solve.timing:
         parts += [str(case.labels), str(case.solve.repeats)]
@@ -60,14 +58,15 @@ def case_key(case: Case, *, folded: bool = False, scaled: bool = False) -> str:
 
 
 @of_scene
-def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, ...], float | None]:
-    """Return the parts of a key before and after the mesh, and the half width (m) of the probe.
+def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...], float | None]:
+    """Return the parts of a key before the mesh, after it, and at its end, and the half width (m) of the probe.
 
     Deep in tissue, neither the body nor the end of the tool has an effect: without a mesh, the half width is None.
     """
     scaled = scaled and not obstacle("scaling", case)
+    last = (*_spread_text(case), *map(_output_text, case.outputs), *_rim_text(case))
     if crack := case.probe.crack:
-        return (str(PHYSICS_VERSION), _material_text(case.material, scaled=False), str(crack)), (), None
+        return (str(PHYSICS_VERSION), _material_text(case.material, scaled=False), str(crack)), (), last, None
     head = (
         str(PHYSICS_VERSION),
         _body_text(case.body, case.scale.stress if scaled else 1.0),
@@ -81,7 +80,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
-    return head, tuple(tail), case.probe.half_width
+    return head, tuple(tail), last, case.probe.half_width
 
 
 def _output_text(output: Output) -> str:
@@ -94,7 +93,6 @@ def _output_text(output: Output) -> str:
     return _text(content)
 
 
-@of_scene
 def _spread_text(case: Case) -> tuple[str, ...]:
     """Return the random fields of the moduli by region, in canonical form; none of a case without."""
     spreads = [tissue.spread for tissue in case.tissues]

@@ -240,6 +240,8 @@ REDUCTIONS: dict[str, Callable[[Plan], Plan]] = {
 
 def _merged(plan: Plan, keys: Sequence[str], name: str, reason: str) -> Plan:
     """Return the plan in which solves of the same one of ``keys`` are one, the first, which serves the cases of all."""
+    if len({*keys}) == len(keys) and all(solve.key == key for solve, key in zip(plan.solves, keys, strict=True)):
+        return plan
     same: dict[str, list[Solve]] = {}
     for solve, key in zip(plan.solves, keys, strict=True):
         same.setdefault(key, []).append(solve)

@@ -1,7 +1,6 @@
 """The interface of every body. It has no defaults: a class that leaves out a property cannot be instantiated."""
 
 from abc import ABC, abstractmethod
-from functools import cached_property
 from itertools import accumulate
 from math import inf
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
@@ -14,7 +13,7 @@ from epsmesh.shapes.half_plane import HalfPlane
 from epsmesh.shapes.part import Around, is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Region
 from epsmesh.shapes.resting import Resting
-from epsmesh.shapes.section import Section, Words
+from epsmesh.shapes.section import Section, Words, kept
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.support import Below, Fixed, Support, support_of
 from epsmesh.shapes.surface import Surface
@@ -78,7 +77,7 @@ class Body(Section, ABC):
         """
         return self.capsule is None or is_part_mirrored(self.capsule.on, normal)
 
-    @property
+    @kept
     def capsules(self) -> dict[str, Capsule]:
         """Its capsule, and those of its regions, by their places in a study, such as inclusion[2].capsule."""
         regions = zip(self.places, self.regions, strict=True)
@@ -89,18 +88,18 @@ class Body(Section, ABC):
             if isinstance(piece, Embedded) and piece.capsule
         }
 
-    @property
+    @kept
     def skins(self) -> tuple[Capsule, ...]:
         """The capsules that a tool may touch: its own, and those of regions that may meet its surface."""
         inner = {piece.name for piece in self.embedded} - {piece.name for piece in self.meeting}
         return tuple(one for one in self.capsules.values() if not (isinstance(one.on, Around) and one.on in inner))
 
-    @property
+    @kept
     def pieces(self) -> dict[str, tuple[Region, ...]]:
         """Its regions with a material of their own, by their key in a study."""
         return {key: found for key in PIECES if (found := getattr(self, key, ()))}
 
-    @property
+    @kept
     def regions(self) -> tuple[Region, ...]:
         """Regions with a material of their own, numbered from 1 in meshes; 0 is the rest of the body.
 
@@ -113,12 +112,12 @@ class Body(Section, ABC):
         """Names of the rest of the body and of its regions, in the order of their numbers."""
         return "tissue", *(piece.name for piece in self.regions)
 
-    @property
+    @kept
     def places(self) -> tuple[str, ...]:
         """Places of its regions in a study, such as inclusion[2], in their order."""
         return tuple(f"{key}[{n}]" for key, found in self.pieces.items() for n in range(1, len(found) + 1))
 
-    @property
+    @kept
     def embedded(self) -> tuple[Embedded, ...]:
         """The last of its regions: those wholly inside it, each bounded by a closed surface."""
         return tuple(piece for piece in self.regions if isinstance(piece, Embedded))
@@ -187,7 +186,7 @@ class Body(Section, ABC):
         """The support that lets go, on which it rests; None if its support is fixed."""
         return None
 
-    @cached_property
+    @kept
     def hold(self) -> Support:
         """The fixed part of its boundary, or the part that rests on a support that lets go."""
         return support_of(self.fixed if self.resting is None else self.resting.on)

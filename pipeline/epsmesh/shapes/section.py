@@ -1,7 +1,8 @@
 """Base class of all sections of a study file, and the texts of their keys."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Protocol, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -26,11 +27,32 @@ OptionalName = Annotated[str, Field(exclude=True, pattern=rf"^({_LETTERS})?$")]
 Name = Annotated[str, Field(exclude=True, pattern=rf"^{_LETTERS}$")]
 
 
+Value = TypeVar("Value")
+
+
+class kept(Generic[Value]):
+    """A property of a section that is found once; unlike ``functools.cached_property``, a changed copy begins anew."""
+
+    def __init__(self, find: Callable[[Any], Value]) -> None:
+        self.find, self.name, self.__doc__ = find, find.__name__, find.__doc__
+
+    def __get__(self, section: Any, owner: type | None = None) -> Value:
+        """Return the value."""
+        try:
+            known: dict[str, Any] = section._known
+        except AttributeError:
+            object.__setattr__(section, "_known", known := {})
+        if self.name not in known:
+            known[self.name] = self.find(section)
+        value: Value = known[self.name]
+        return value
+
+
 class Section(BaseModel):
     """A section of a study file: strict, frozen; lengths in metres, pressures in pascal."""
 
     # Built at the first validation: no study has all sections.
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True, ignored_types=(kept,))
 
     name: Annotated[
         str,
@@ -39,9 +61,10 @@ class Section(BaseModel):
     ] = ""
 
     # Not in `__dict__`: what compares and copies a model leaves it alone.
-    __slots__ = ("_hash",)
+    __slots__ = ("_hash", "_known")
     if TYPE_CHECKING:
         _hash: int
+        _known: dict[str, Any]
 
     def __hash__(self) -> int:
         """Return the hash of its values, which is computed once: many cases of a study have the same section."""

@@ -263,6 +263,7 @@ class Case:
         return self.mesh.epsilon == inf or self.mesh.epsilon >= self.farthest
 
     @property
+    @of_scene
     def has_quarter_points(self) -> bool:
         """Whether elements at a singular edge of the probe have quarter points.
 

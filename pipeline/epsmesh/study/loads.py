@@ -9,7 +9,7 @@ from pydantic import Field, create_model
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.part import Part, is_part_mirrored
 from epsmesh.shapes.registry import TERMS
-from epsmesh.shapes.section import OptionalName, Section, Words
+from epsmesh.shapes.section import OptionalName, Section, Words, kept
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.units import Acceleration, Stress
 
@@ -74,7 +74,7 @@ class _Load(Section):
         tuple[Traction, ...], Words("Tractions on parts of the boundary.", "[[load.traction]]", default="none")
     ] = ()
 
-    @property
+    @kept
     def terms(self) -> tuple[BodyTerm, ...]:
         """What else acts on the body, of all kinds of terms."""
         return tuple(term for name in TERMS for term in getattr(self, name))
@@ -86,7 +86,7 @@ class _Load(Section):
         inner = (Traction.model_construct(on=name, pressure=pressure) for name, pressure in pressures.items())
         return self.model_copy(update={"traction": (*self.traction, *inner)})
 
-    @property
+    @kept
     def acts(self) -> bool:
         """Whether there is any load."""
         return any(self.gravity) or any(traction.acts for traction in self.traction)

@@ -1,7 +1,7 @@
 """Which studies a real-time model supports, and the case and range that it covers."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -97,10 +97,10 @@ def scope_of(study: Study) -> Scope:
     Raises:
         ExportError: if the study cannot be exported.
     """
-    scenes: dict[int, Case] = {}  # their other cases differ in what no model depends on: the mesh and the solver
-    for case in study.cases():
-        scenes.setdefault(id(case.shared), case)
-    cases = list(scenes.values())
+    scenes: dict[Hashable, tuple[int, ...]] = {}  # other cases differ in what no model depends on: mesh and solver
+    for index in study.indices():
+        scenes.setdefault(study.scene(index), index)
+    cases = [study.case(index) for index in scenes.values()]
     first = cases[0]
     for case in cases:
         if reason := _refusal(case, first):
