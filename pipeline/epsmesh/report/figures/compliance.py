@@ -15,6 +15,7 @@ from epsmesh.report.words import choice
 _PER_MM = 1e-3  # of 1/m
 _ROOM = 1.04  # to the right of the last tool
 _WHOLE = "whole_compliance"
+_DRAWN = ["position", _WHOLE, "of_full_order", "force_bar", "touch"]
 _OF_CONTACT = {"bonded": {"linestyle": "--", "markerfacecolor": "none"}}
 
 
@@ -67,6 +68,7 @@ def _with_positions(dataset: xr.Dataset) -> tuple[xr.Dataset, str]:
 
 def _draw(ax: Axes, data: xr.Dataset) -> None:
     """Draw the tools of one panel: bars of F, and full order's line raised by the mean of what is added."""
+    data = data[_DRAWN]
     contacts = np.unique(data["touch"].values.astype(str))
     order = np.argsort(data["epsilon"].values)[::-1]
     for number, place in enumerate(order):

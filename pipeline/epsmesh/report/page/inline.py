@@ -45,7 +45,6 @@ def in_page(figure: Figure, name: str) -> dict[str, Any]:
     figure.supxlabel("")
     with mpl.rc_context(STYLE):
         figure.set_dpi(_POINTS)  # as in the file: places and cuts are then the same
-        figure.draw_without_rendering()
         figure.set_figwidth(_width(figure))
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
@@ -72,12 +71,13 @@ def in_page(figure: Figure, name: str) -> dict[str, Any]:
 
 
 def _width(figure: Figure) -> float:
-    """Return how wide (inches) a figure that is drawn is to be in a page."""
+    """Return how wide (inches) a figure is to be in a page; one column alone is drawn, to see what is beside it."""
     width, columns = figure.get_figwidth(), _columns(figure)
-    if columns > 1:
-        return max(width, _LEAST)
+    if columns != 1:
+        return max(width, _LEAST) if columns else width
+    figure.draw_without_rendering()
     cuts, _ = _cuts(figure)
-    return width + _ALONE - min([*cuts, _POINTS * width]) / _POINTS if columns else width
+    return width + _ALONE - min([*cuts, _POINTS * width]) / _POINTS
 
 
 def _columns(figure: Figure) -> int:
