@@ -62,5 +62,7 @@ def _environment() -> dict[str, str]:
     """Restrict every library to one thread; ranks and NGSolve's tasks are set separately."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH", "")) if part)
+    # The other programs' venv has no epsmesh: known forces import its types.
+    own = (str(ROOT), str(ROOT / "pipeline"), os.environ.get("PYTHONPATH", ""))
+    path = os.pathsep.join(part for part in own if part)
     return os.environ | dict.fromkeys(names, "1") | root | {"PYTHONPATH": path}
