@@ -21,12 +21,12 @@ from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import vector
 from epsmesh.solve.conditions import Conditions
-from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Solver
+from epsmesh.solve.elements.base import Elements, HierarchicalEstimate, Linearised, Solver, level_of
 from epsmesh.solve.elements.fields import Column, ElementFields, Fields
 from epsmesh.solve.elements.pressures import Pressures
 from epsmesh.solve.elements.tangent import Tangent
 from epsmesh.solve.krylov import keep
-from epsmesh.solve.linear_solver import Level
+from epsmesh.solve.linear_solver import Level, LinearSolver
 from epsmesh.solve.movement import Movement
 from epsmesh.solve.physics import MaterialLaw, SplitLaw
 from epsmesh.solve.saddle import Saddle, SaddleSolver
@@ -77,9 +77,9 @@ class MixedElements(Elements):
 
     def close(self) -> None:
         """Free what is kept between solves."""
+        self._forget()
         if self._finer is not None:
             self._finer.close()
-        self._set_up.close()
         self._stack.close()
 
     def elastic(self, law: MaterialLaw) -> MaterialLaw:
@@ -205,9 +205,17 @@ class MixedElements(Elements):
             self._finer = MixedElements(self._spaces, self.degree + 1, self._conditions)
         return self._finer
 
-    def saddle(self, elastic: MaterialLaw, stack: ExitStack, *, direct: bool) -> Saddle:
-        """Return the blocks for λ₀ and μ of the law ``elastic``, freed with the ``stack``."""
-        levels = self.levels(elastic, stack, direct=direct)
+    def saddle(
+        self, elastic: MaterialLaw, stack: ExitStack, *, direct: bool, below: LinearSolver | None = None
+    ) -> Saddle:
+        """Return the blocks for λ₀ and μ of the law ``elastic``, freed with the ``stack``.
+
+        ``below`` has the levels of one degree less, which must live as long.
+        """
+        if below is None:
+            levels = self.levels(elastic, stack, direct=direct)
+        else:
+            levels = [*below.levels, level_of(self.displacements, elastic, stack)]
         return self.saddle_of(levels, elastic, *self.pressures.blocks(entries=direct))
 
     def saddle_of(self, levels: list[Level], elastic: MaterialLaw, coupling: PETSc.Mat, mass: PETSc.Mat) -> Saddle:
@@ -215,11 +223,27 @@ class MixedElements(Elements):
         stiffness = self.pressures.by_region(tuple(part.lame_lambda + 2 * part.lame_mu for part in elastic.parameters))
         return Saddle(levels, coupling, mass, stiffness, self.degree - 1)
 
+    def finer_solver(self, elastic: MaterialLaw) -> SaddleSolver:
+        """Return the iterative solver of the elements of one degree more, on the levels of this one's, if it has one.
+
+        It lives as long as that.
+        """
+        below = self._solvers.get(False, (None, None))[0] if self._is_set_up_for(elastic) else None
+        return self.finer()._solver(elastic, direct=False, below=below)
+
+    def _is_set_up_for(self, elastic: MaterialLaw) -> bool:
+        return elastic == self._elastic and (elastic.unit == self._elastic.unit or not self.displacements.terms)
+
+    def _forget(self) -> None:
+        """Free the solvers, those of one degree more first: they share levels."""
+        if self._finer is not None:
+            self._finer._forget()
+        self._set_up.close()
+        self._solvers.clear()
+
     def _solver(self, elastic: MaterialLaw, *, direct: bool, below: SaddleSolver | None = None) -> SaddleSolver:
-        is_same = elastic == self._elastic and (elastic.unit == self._elastic.unit or not self.displacements.terms)
-        if not is_same:
-            self._set_up.close()
-            self._solvers.clear()
+        if not self._is_set_up_for(elastic):
+            self._forget()
             self._elastic = elastic
         recharge(self._cost)
         if direct in self._solvers:
@@ -227,7 +251,8 @@ class MixedElements(Elements):
             recharge(cost)
             return solver
         with recorded() as cost, stage("set-up"):
-            saddle = self.saddle(elastic, self._set_up, direct=direct)
+            known = None if below is None else below.multigrid
+            saddle = self.saddle(elastic, self._set_up, direct=direct, below=known)
             solver = self._set_up.enter_context(SaddleSolver(saddle, direct=direct, below=below))
         self._solvers[direct] = solver, cost
         return solver
@@ -262,9 +287,7 @@ class MixedSolver(Solver):
     ) -> HierarchicalEstimate:
         """Return the hierarchical estimate, from elements of one degree more."""
         coarse, finer = self.elements, self.elements.finer()
-        below = coarse._solvers.get(False, (None, None))[0]
-        saddle = finer._solver(coarse.elastic(self.law), direct=False, below=below)
-        above = MixedSolver(finer, self.law, saddle, is_exact=False)
+        above = MixedSolver(finer, self.law, coarse.finer_solver(coarse.elastic(self.law)), is_exact=False)
         found = finer.columns(movement, stack)
         for column, fine in zip(columns, found, strict=True):
             coarse.show([column], [1.0])
@@ -292,8 +315,7 @@ class LinearisedMixed(Linearised):
         return self._finer_saddle().preconditioner(self._elements.finer().compliance(self._law), self._stack)
 
     def _finer_saddle(self) -> SaddleSolver:
-        below = self._elements._solvers.get(False, (None, None))[0]
-        return self._elements.finer()._solver(self._elements.elastic(self._law), direct=False, below=below)
+        return self._elements.finer_solver(self._elements.elastic(self._law))
 
     def decrements(self, residuals: Sequence[Fields]) -> tuple[FloatArray, FloatArray]:
         """Return decrements and N."""
