@@ -39,20 +39,22 @@ def call(name: str, *arguments: Any) -> Any:
         TypeError: if an array is not of the declared type.
         ValueError: if it is not contiguous.
     """
-    function, of_array, arrays = _function(name)
-    passed = [
-        _passed(name, of_array, kind, value) if isinstance(value, np.ndarray) else value
-        for kind, value in zip(arrays, arguments, strict=True)
-    ]
+    function, of_array, kinds = _function(name)
+    passed = []
+    for kind, value in zip(kinds, arguments, strict=True):  # a case makes a thousand calls: nothing more than needed
+        if isinstance(value, np.ndarray):
+            if kind is None or (value.dtype is not kind[1] and value.dtype != kind[1]):
+                raise _other_type(name, kind, value)
+            # From its bytes alone, cffi would take an array of any type.
+            passed.append(of_array(kind[0], value))
+        else:
+            passed.append(value)
     return function(*passed)
 
 
-def _passed(name: str, of_array: Any, kind: tuple[Any, np.dtype] | None, values: np.ndarray) -> Any:
-    """Return an array as C takes it: from its bytes alone, cffi would take those of any type."""
-    if kind is None or values.dtype != kind[1]:
-        expected = "a number" if kind is None else f"an array of {kind[1]}"
-        raise TypeError(f"{name} in C takes {expected}, not an array of {values.dtype}")
-    return of_array(kind[0], values)
+def _other_type(name: str, kind: tuple[Any, np.dtype] | None, values: np.ndarray) -> TypeError:
+    expected = "a number" if kind is None else f"an array of {kind[1]}"
+    return TypeError(f"{name} in C takes {expected}, not an array of {values.dtype}")
 
 
 def precision(values: np.ndarray) -> str:
@@ -82,8 +84,9 @@ def address(name: str) -> int:
 def point_at(name: str, values: np.ndarray) -> None:
     """Point a C pointer of the library at ``values``, which the caller must keep alive."""
     module = library()
-    double = module.ffi.typeof("double[]"), np.dtype(float)
-    setattr(module.lib, name, _passed(name, module.ffi.from_buffer, double, values))
+    if values.dtype != np.dtype(float):
+        raise _other_type(name, (None, np.dtype(float)), values)
+    setattr(module.lib, name, module.ffi.from_buffer("double[]", values))
 
 
 @cache
