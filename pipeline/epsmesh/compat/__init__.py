@@ -11,12 +11,14 @@ from petsc4py import PETSc
 from epsmesh.compat.code import (
     EVERYWHERE,
     Code,
+    Parts,
     coefficients_of,
     compile_code,
     function_space,
     general_form,
     kernels_of,
     make_form,
+    parts_of,
     renumbered_space,
 )
 from epsmesh.compat.elements import (
@@ -45,6 +47,7 @@ from epsmesh.compat.meshes import (
 __all__ = [
     "EVERYWHERE",
     "Code",
+    "Parts",
     "add_from_ghosts",
     "add_matrix",
     "assemble_matrix",
@@ -69,6 +72,7 @@ __all__ = [
     "mixed_element",
     "original_cells",
     "partition",
+    "parts_of",
     "quadrature_element",
     "reference_element",
     "renumbered_space",

@@ -6,7 +6,7 @@ Versions differ in how they name the options of their compiler, what they ask of
 import inspect
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import dolfinx
 import numpy as np
@@ -36,13 +36,28 @@ def compile_code(comm: MPI.Comm, expression: Any, options: dict[str, Any]) -> Co
     return dolfinx.jit.ffcx_jit(comm, expression, form_compiler_options=scalar, jit_options=options)
 
 
-def make_form(expression: Any, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
-    """Return the form that ``expression`` was compiled to; ``tags`` are those of the cells that UFL has of it.
+class Parts(NamedTuple):
+    """What the code of a form acts on, in the order in which the code has it: objects of UFL, which dolfinx's are."""
+
+    spaces: list[Any]
+    functions: list[Any]
+    constants: list[Any]
+
+
+def parts_of(expression: Any, compiled: Any) -> Parts:
+    """Return the parts of an expression that was ``compiled``."""
+    spaces = [argument.ufl_function_space() for argument in expression.arguments()]
+    return Parts(spaces, coefficients_of(expression, compiled), list(expression.constants()))
+
+
+def make_form(parts: Parts, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
+    """Return the form of compiled ``code`` with its ``parts``; ``tags`` are those of the cells, as UFL has them.
 
     ``kernels`` are addresses of kernels for integrals over cells, by the mark of the cells, instead of the compiled.
     """
     make = _form_of_addresses if kernels else _form_of_code
-    return make(expression, mesh, _marked(tags), code, kernels)
+    parts = Parts(*([one._cpp_object for one in some] for some in parts))
+    return make(parts, mesh, _marked(tags), code, kernels)
 
 
 def general_form(expression: Any, options: dict[str, Any]) -> Any:
@@ -85,11 +100,10 @@ def renumbered_space(space: Any, dofs: np.ndarray, owned: int, ghosts: np.ndarra
     return fem.FunctionSpace(mesh, space.ufl_element(), made)
 
 
-def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int, int]) -> Any:
+def _form_of_code(parts: Parts, mesh: Any, tags: Any, code: Code, _: dict[int, int]) -> Any:
     """Make the C++ form as ``fem.form`` does after it has compiled."""
     compiled, module, _ = code
-    coefficients = _coefficients(expression, compiled)
-    address, spaces, constants = _address(module, compiled), _spaces(expression), _constants(expression)
+    (spaces, coefficients, constants), address = parts, _address(module, compiled)
     if _IS_OLD:
         marked = {fem.IntegralType.cell: tags}
         return _wrapped(code, address, spaces, coefficients, constants, marked, mesh)
@@ -99,19 +113,19 @@ def _form_of_code(expression: Any, mesh: Any, tags: Any, code: Code, _: dict[int
     return _wrapped(code, forms, spaces, coefficients, constants, cells, maps, mesh)
 
 
-def _form_of_addresses(expression: Any, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
+def _form_of_addresses(parts: Parts, mesh: Any, tags: Any, code: Code, kernels: dict[int, int]) -> Any:
     """Make the C++ form of kernels: those of ``kernels``, and the generated ones for other marks."""
     generated = kernels_of(code)
     chosen = generated | {mark: kernel for mark, kernel in kernels.items() if mark in generated}
-    spaces, constants, coefficients = _spaces(expression), _constants(expression), _coefficients(expression, code[0])
+    spaces, coefficients, constants = parts
     if _IS_OLD:
         marked = {fem.IntegralType.cell: (list(chosen.items()), tags)}
         return _wrapped(code, spaces, marked, coefficients, constants, False, mesh)
     used = np.arange(len(coefficients), dtype=np.int8)
     # Since 0.10 integrals are numbered one after the other, whatever their marks.
     numbers = range(len(chosen)) if _has_entity_maps() else chosen
-    parts = [(n, kernel, _cells(mesh, tags, m), used) for n, (m, kernel) in zip(numbers, chosen.items(), strict=True)]
-    integrals = {fem.IntegralType.cell: parts}
+    found = [(n, kernel, _cells(mesh, tags, m), used) for n, (m, kernel) in zip(numbers, chosen.items(), strict=True)]
+    integrals = {fem.IntegralType.cell: found}
     return _wrapped(code, spaces, integrals, coefficients, constants, False, _entity_maps(), mesh)
 
 
@@ -148,24 +162,12 @@ def _marked(tags: Any) -> Any:
     return next((found for found in tags if found is not None), None) if isinstance(tags, list) else tags
 
 
-def _spaces(expression: Any) -> list[Any]:
-    return [argument.ufl_function_space()._cpp_object for argument in expression.arguments()]
-
-
 def coefficients_of(expression: Any, compiled: Any) -> list[Any]:
     """Return the functions (UFL) of an expression, in the order in which its compiled code has them."""
     name = "original_coefficient_position"
     positions = getattr(compiled, name if _IS_OLD else name + "s")
     functions = expression.coefficients()
     return [functions[positions[i]] for i in range(compiled.num_coefficients)]
-
-
-def _coefficients(expression: Any, compiled: Any) -> list[Any]:
-    return [function._cpp_object for function in coefficients_of(expression, compiled)]
-
-
-def _constants(expression: Any) -> list[Any]:
-    return [constant._cpp_object for constant in expression.constants()]
 
 
 def _entity_maps() -> Any:

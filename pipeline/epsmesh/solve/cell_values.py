@@ -22,10 +22,10 @@ from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.quantities import CLEAR
 from epsmesh.scene.model import FIXED, MIRROR, PROBE
-from epsmesh.solve.compiled import cellwise_space, form, vector_space
+from epsmesh.solve.compiled import cellwise_space, form_like, vector_space
 from epsmesh.solve.conditions import Front
 from epsmesh.solve.forms import one_cell
-from epsmesh.solve.measures import dx
+from epsmesh.solve.measures import dx, marked_cells
 from epsmesh.solve.physics import MaterialLaw, of_regions
 from epsmesh.stages import stage
 
@@ -89,10 +89,16 @@ class CellValues:
         self._body, self._is_mixed, self._factors = body, is_mixed, factors
         space = displacement.function_space
         tensors = cellwise_space(space.mesh, (3, 3))
-        test, ones = ufl.TestFunction(tensors), ufl.as_tensor(np.ones((3, 3)).tolist())
-        self._integral, self._volume = (
-            form(ufl.inner(integrand, test) * dx(space)) for integrand in (ufl.grad(displacement), ones)
-        )
+
+        def made(name: str, integrand: Callable[[], Any], *parts: Any) -> Any:
+            def expression() -> Any:
+                return ufl.inner(integrand(), ufl.TestFunction(tensors)) * dx(space)
+
+            kind = name, compat.degree(space)
+            return form_like(kind, expression, space.mesh, marked_cells(space.mesh), tensors, *parts)
+
+        self._integral = made("gradient", lambda: ufl.grad(displacement), displacement)
+        self._volume = made("volume", lambda: ufl.as_tensor(np.ones((3, 3)).tolist()))
 
     @stage("strain")
     def cells(self, law: MaterialLaw) -> Cells:

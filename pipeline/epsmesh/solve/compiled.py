@@ -8,7 +8,7 @@ it may pass addresses of hand-written kernels instead. The cache folder belongs 
 import fcntl
 import hashlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -27,6 +27,8 @@ from epsmesh.files import cache_folder
 # Integrands of large displacements are no polynomials: quadrature degrees added to those of linear elasticity.
 MORE = 2
 _known: dict[tuple[str, str], compat.Code] = {}
+# Code of the kinds of forms, and where it finds its parts.
+_made: dict[tuple[Any, ...], tuple[compat.Code, list[list[int]]]] = {}
 # The cache folders whose lock this process has.
 _locked: set[Path] = set()
 
@@ -40,7 +42,38 @@ def form(expression: Any, kernels: dict[int, int] | None = None) -> Any:
     ((domain, tags),) = expression.subdomain_data().items()
     mesh = domain.ufl_cargo()
     code = _code(mesh.comm, expression, expression.signature())
-    return compat.make_form(expression, mesh, tags.get("cell"), code, kernels or {})
+    return compat.make_form(compat.parts_of(expression, code[0]), mesh, tags.get("cell"), code, kernels or {})
+
+
+def form_like(
+    kind: tuple[Any, ...],
+    expression: Callable[[], Any],
+    mesh: Any,
+    marks: Any,
+    *parts: Any,
+    kernels: dict[int, int] | None = None,
+) -> Any:
+    """Return the form of an ``expression`` of some ``parts``: spaces, functions and constants; collective.
+
+    On one rank the expression is made once for each ``kind``, with the elements of the parts and of the ``mesh``: UFL
+    takes a millisecond for it. The kind must tell all else of it. ``marks`` are the tags of its cells, or None.
+    """
+    elements = [part.ufl_element() if hasattr(part, "ufl_element") else part.ufl_shape for part in parts]
+    domain = mesh.ufl_domain()
+    key = form_cache(), kind, repr(domain.ufl_coordinate_element()), marks is None, *map(repr, elements)
+    if mesh.comm.size > 1 or key not in _made:
+        made = expression()
+        code = _code(mesh.comm, made, made.signature())
+        found = compat.parts_of(made, code[0])
+        _made[key] = code, [[_place(parts, one) for one in some] for some in found]
+    code, places = _made[key]
+    of = compat.Parts(*([parts[place] for place in some] for some in places))
+    return compat.make_form(of, domain.ufl_cargo(), marks, code, kernels or {})
+
+
+def _place(parts: Sequence[Any], one: Any) -> int:
+    """Return the number of ``one`` of the parts."""
+    return next(number for number, part in enumerate(parts) if part is one)
 
 
 def general_form(expression: Any) -> Any:

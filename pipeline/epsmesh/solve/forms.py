@@ -4,7 +4,7 @@
 form is made at its first use, which is collective.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -22,6 +22,7 @@ from epsmesh.solve.compiled import (
     MORE,
     cellwise_space,
     form,
+    form_like,
     quadrature_degree,
     quadrature_space,
     scalar_space,
@@ -29,7 +30,7 @@ from epsmesh.solve.compiled import (
 )
 from epsmesh.solve.laws import LAWS
 from epsmesh.solve.laws.law import Pressure
-from epsmesh.solve.measures import STRAIGHT, curved_cells, dx, measures_of
+from epsmesh.solve.measures import STRAIGHT, curved_cells, dx, marked_cells, measures_of
 from epsmesh.solve.physics import COEFFICIENTS, MaterialLaw, of_regions, strain
 from epsmesh.solve.point_law import PointLaw
 from epsmesh.solve.variation import Factors
@@ -58,7 +59,7 @@ class ElasticForms:
         cell_kernel: CellKernel | None = None,
         factors: Factors | None = None,
     ):
-        self._space, self._regions = space, regions
+        self._space, self._regions, self._varies = space, regions, factors is not None
         self._cell_kernel = cell_kernel if factors is None else None
         self.factor: Any = 1
         self.is_sampled = is_sampled(space, factors)
@@ -121,20 +122,40 @@ class ElasticForms:
                 values, self._regions, len(self._regions)
             )
 
+    def form(
+        self,
+        name: str,
+        integrand: Callable[[], Any],
+        *parts: Any,
+        curved_only: bool = False,
+        kernels: dict[int, int] | None = None,
+    ) -> Any:
+        """Return the form of an ``integrand`` of some ``parts``, times the factor: see :func:`.form_like`.
+
+        The ``name`` tells integrands of the same parts apart.
+        """
+        if self._varies:
+            return form(self.factor * integrand() * self.dx(curved_only=curved_only), kernels)
+        kind, mesh = (name, compat.degree(self._space), curved_only), self._space.mesh
+        marks = marked_cells(mesh, curved_only=curved_only)
+        return form_like(
+            kind, lambda: integrand() * self.dx(curved_only=curved_only), mesh, marks, *parts, kernels=kernels
+        )
+
     @cached_property
     def stiffness(self) -> Any:
         """Stiffness K."""
-        return self._form(ufl.TrialFunction(self._space), self.dx(), self._kernels())
+        return self._form("stiffness", kernels=self._kernels())
 
     @cached_property
     def curved_stiffness(self) -> Any:
         """The part of K from cells with curved edges: the same code, with only these cells marked."""
-        return self._form(ufl.TrialFunction(self._space), self.dx(curved_only=True))
+        return self._form("stiffness", curved_only=True)
 
     @cached_property
     def action(self) -> Any:
         """Product K u."""
-        return self._form(self.displacement, self.dx())
+        return self._form("action", self.displacement)
 
     def _kernels(self) -> dict[int, int]:
         """Return the hand-written kernel for straight cells: it takes a twelfth of the time of the generated one."""
@@ -143,10 +164,15 @@ class ElasticForms:
         kernel = self._cell_kernel(compat.degree(self._space), of_regions=self._regions is not None)
         return {compat.EVERYWHERE if curved_cells(self._space.mesh) is None else STRAIGHT: kernel}
 
-    def _form(self, u: Any, measure: Any, kernels: dict[int, int] | None = None) -> Any:
-        v, of = ufl.TestFunction(self._space), self.coefficients
-        work = of["lame_lambda"] * ufl.div(u) * ufl.div(v) + 2 * of["lame_mu"] * ufl.inner(strain(u), strain(v))
-        return form(self.factor * work * measure, kernels)
+    def _form(self, name: str, *given: Any, **options: Any) -> Any:
+        """Return the work of the stress of the function that is ``given``, or of the trial function."""
+        space, lame_lambda, lame_mu = self._space, self.coefficients["lame_lambda"], self.coefficients["lame_mu"]
+
+        def work() -> Any:
+            (u,), v = given or (ufl.TrialFunction(space),), ufl.TestFunction(space)
+            return lame_lambda * ufl.div(u) * ufl.div(v) + 2 * lame_mu * ufl.inner(strain(u), strain(v))
+
+        return self.form(name, work, space, lame_lambda, lame_mu, *given, **options)
 
 
 class MixedForms:
@@ -163,27 +189,26 @@ class MixedForms:
     @cached_property
     def mass(self) -> Any:
         """Mass M."""
-        p, q = ufl.TrialFunction(self._pressures), ufl.TestFunction(self._pressures)
-        return self._form(p * q)
+        q = self._pressures
+        return self._elastic.form("mass", lambda: ufl.TrialFunction(q) * ufl.TestFunction(q), q)
 
     @cached_property
     def coupling(self) -> Any:
         """Coupling B."""
-        u, q = ufl.TrialFunction(self._displacement.function_space), ufl.TestFunction(self._pressures)
-        return self._form(q * ufl.div(u))
+        u, q = self._displacement.function_space, self._pressures
+        return self._elastic.form("coupling", lambda: ufl.TestFunction(q) * ufl.div(ufl.TrialFunction(u)), q, u)
 
     @cached_property
     def dilation(self) -> Any:
         """Product B u, a vector on pressures."""
-        return self._form(ufl.TestFunction(self._pressures) * ufl.div(self._displacement))
+        u, q = self._displacement, self._pressures
+        return self._elastic.form("dilation", lambda: ufl.TestFunction(q) * ufl.div(u), q, u)
 
     @cached_property
     def pull(self) -> Any:
         """Product Bᵀ p, a vector on displacements."""
-        return self._form(self.pressure * ufl.div(ufl.TestFunction(self._displacement.function_space)))
-
-    def _form(self, integrand: Any) -> Any:
-        return form(self._elastic.factor * integrand * self._elastic.dx())
+        u, p = self._displacement.function_space, self.pressure
+        return self._elastic.form("pull", lambda: p * ufl.div(ufl.TestFunction(u)), u, p)
 
 
 class HyperelasticForms:

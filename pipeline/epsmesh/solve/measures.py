@@ -17,6 +17,7 @@ from epsmesh.solve.compiled import quadrature_degree
 _NEITHER, STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
 CURVED: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
+MARKED: WeakKeyDictionary[Any, dict[bool, Any]] = WeakKeyDictionary()
 
 
 def dx(space: Any, *, curved_only: bool = False, more: int = 0, everywhere: bool = False) -> Any:
@@ -27,12 +28,20 @@ def dx(space: Any, *, curved_only: bool = False, more: int = 0, everywhere: bool
     """
     degree, mesh = compat.degree(space), space.mesh
     exact, enough = ({"quadrature_degree": d} for d in (2 * degree - 2 + more, quadrature_degree(degree)))
-    curved = curved_cells(mesh)
-    if everywhere or curved is None:
+    marks = None if everywhere else marked_cells(mesh, curved_only=curved_only)
+    if marks is None:
         return ufl.dx(metadata=enough if everywhere else exact)
-    marks = np.where(curved, _CURVED, _NEITHER if curved_only else STRAIGHT)
-    measure = ufl.Measure("dx", domain=mesh, subdomain_data=compat.cell_tags(mesh, marks))
+    measure = ufl.Measure("dx", domain=mesh, subdomain_data=marks)
     return measure(STRAIGHT, metadata=exact) + measure(_CURVED, metadata=enough)
+
+
+def marked_cells(mesh: Any, *, curved_only: bool = False) -> Any:
+    """Return tags of the cells of a mesh, straight and curved ones, or of curved ones only; None if none can be."""
+    curved, known = curved_cells(mesh), MARKED.setdefault(mesh, {})
+    if curved is not None and curved_only not in known:
+        marks = np.where(curved, _CURVED, _NEITHER if curved_only else STRAIGHT)
+        known[curved_only] = compat.cell_tags(mesh, marks)
+    return known.get(curved_only)
 
 
 def measures_of(
