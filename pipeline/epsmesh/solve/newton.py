@@ -7,7 +7,7 @@ tangent is positive definite.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 from typing import Generic, Protocol, TypeVar
 
 from epsmesh.solve import SolveError
@@ -20,8 +20,9 @@ ON_THE_WAY = 1e-4
 EASY = 4
 # A residual has stalled if an iteration leaves this share of it; then rounding of gradients may be all of it.
 _STALLS = 0.5
-# Tolerances of linear solves: the first one and the least, and the share of the gain that is needed to the end.
-_ROUGH, FINE, _SPARE = 1e-1, 1e-4, 0.1
+# Tolerances of linear solves: the largest, the least, that without an earlier gain, and the share of the gain needed to
+# the end.
+_ROUGH, FINE, _UNTRIED, _SPARE = 1e-1, 1e-4, 3e-2, 0.1
 # Sufficient decrease: least gain, as a share of that predicted by the slope.
 _GAIN = 1e-4
 # Most halvings of a step.
@@ -161,7 +162,8 @@ class _Hold(Newton[int]):
             return iteration
         if self._left > _STALLS * before and self._left <= body.rounding():
             return iteration  # loads, or a depth, next to nothing
-        self._tolerance = forcing(self._left / before, self._limit * scale / self._left)
+        needed = self._limit * scale / self._left
+        self._tolerance = forcing(self._left / before if before < inf else sqrt(_UNTRIED), needed)
         self._before = self._left
         return None
 
