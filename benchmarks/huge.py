@@ -5,14 +5,19 @@ mixed ones (.49), of a tenth of a million, one and ten million unknowns. Each ca
 processor seconds, from the geometry to the error bar. Its memory is the peak of one process, libraries included.
 
 Forecasts are those of a plan before the mesh exists. The times of a plan follow stored cases: a forecast knows those of
-the smaller cases, the first one none. Ten million unknowns take 3 to 5 minutes, and up to 16 GB.
+the smaller cases, the first one none. A case that fails has a line instead, and the memory that a plan says it needs.
+
+The second table has the parts of a multigrid cycle for a million unknowns, with coarser meshes as levels and without.
+All takes some six minutes, and up to 12 GB.
 """
 
+import json
 from typing import Any
 
-from benchmarks.processor import run
+from benchmarks import products
+from benchmarks.processor import ask, run
 from benchmarks.scenes import BOX, DISC, graded, study
-from benchmarks.tables import Table, options
+from benchmarks.tables import Table, markdown, options, write
 from epsmesh.plan.cost import CostModel, Observation, StepEstimate, fit
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.record import Record
@@ -22,6 +27,8 @@ from epsmesh.study.read import parse
 # from 200,000 on twice.
 POISSON = {"displacement": 0.3, "mixed": 0.49}
 SIZES = {"0.1": 2.6, "1": 0.985, "10": 0.443}
+# Millions of unknowns of the case whose cycle is measured, with these levels below degree 1.
+CYCLE, WAYS = "1", ("coarser meshes", "algebraic")
 COLUMNS = {
     "element": "",
     "unknowns": ",d",
@@ -70,18 +77,41 @@ def measure(element: str, size: str, known: list[Observation]) -> dict[str, Any]
     }
 
 
+def parts(size: str) -> list[dict[str, Any]]:
+    """Return the rows of the parts of a cycle, each way in a process of its own."""
+    ways = [ask(["-m", "benchmarks.huge", "--cycle", size, *more]) for more in ([], ["--algebraic"])]
+    names = dict.fromkeys(name for way in ways for name in way)
+    return [{"part": name, **dict(zip(WAYS, (way.get(name, 0.0) for way in ways), strict=True))} for name in names]
+
+
 def main() -> None:
     """Measure, print and write."""
     parser = options(__doc__)
+    parser.add_argument("--cycle", choices=SIZES, help="the parts of a cycle alone, as JSON")
+    parser.add_argument("--algebraic", action="store_true", help="without coarser meshes")
     parser.add_argument("--elements", nargs="+", choices=POISSON, default=list(POISSON))
     parser.add_argument("--sizes", nargs="+", choices=SIZES, default=list(SIZES), help="millions of unknowns")
     asked = parser.parse_args()
-    table = Table(COLUMNS)
+    if asked.cycle:
+        case = parse(scene("displacement", asked.cycle)).case(())
+        print(json.dumps(products.cycle(case, meshes=not asked.algebraic)))
+        return
+    table, failed = Table(COLUMNS), ""
     for element in asked.elements:
         known: list[Observation] = []
         for size in asked.sizes:
-            table.add(measure(element, size, known))
-    table.write("huge", asked.output)
+            try:
+                table.add(measure(element, size, known))
+            except RuntimeError as error:
+                needed = forecast(scene(element, size), fit(known)).memory / 1e9
+                failed += (
+                    f"{element}, {size} million unknowns: {str(error).splitlines()[0]} (plan: {needed:.1f} GB)\n\n"
+                )
+                print(failed, flush=True)
+    of_cycle = parts(CYCLE)
+    columns = {"part": ""} | dict.fromkeys(WAYS, ".1f")
+    text = f"{markdown(table.rows, COLUMNS)}\n{failed}Parts of a cycle, {CYCLE} million unknowns, ns for each:\n\n"
+    write("huge", asked.output, {"rows": table.rows, "cycle": of_cycle}, text + markdown(of_cycle, columns))
 
 
 if __name__ == "__main__":

@@ -3,8 +3,11 @@
 A disc on a box, a quarter of it, graded to the probe's edge. Set-up and solve are in units of one application of the
 finest operator (a product with its blocked matrix), measured before and after. The figures therefore mean the same on
 another machine, and on a busy one, as times are those of the processor. Each row is a separate process, since the peak
-memory of a process is that of its largest solve. ``DIRECT_LIMIT`` in ``epsmesh.solve.krylov`` and
-``epsmesh.solve.elements.mixed`` is from here, and so are the bytes per dof in ``epsmesh.plan.estimate``.
+memory of a process is that of its largest solve. Levels are those of the multigrid cycle: degrees (p), then coarser
+meshes (h), with the unknowns of the last, below which levels are algebraic.
+
+``DIRECT_LIMIT`` in ``epsmesh.solve.krylov`` and ``epsmesh.solve.elements.mixed`` is from here, and so are the bytes per
+dof in ``epsmesh.plan.estimate``.
 """
 
 import itertools
@@ -19,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import products
 from benchmarks.processor import ask
 from benchmarks.scenes import BOX, DISC, graded, study
 from benchmarks.tables import Table, markdown, options, write
@@ -31,6 +35,8 @@ RATIOS = {"displacement": (0.3, 0.45, 0.49), "mixed": (0.45, 0.49, 0.4999)}
 YOUNG = 10e3
 WITHOUT_HYPRE = "iterative, gamg"
 PRESS = Motion((0.0, 0.0, -1.0))
+# Degrees and element sizes of the products that are measured.
+PRODUCTS = ((2, LARGE[2][0]), (2, LARGE[2][2]), (3, LARGE[3][0]))
 # Solves that take longer than this (s) are not repeated: they vary little.
 _ENOUGH = 8.0
 COLUMNS = {
@@ -39,6 +45,7 @@ COLUMNS = {
     "poisson": "g",
     "dofs": "d",
     "method": "",
+    "levels": "",
     "iterations": "d",
     "assemble": ".0f",
     "setup": ".0f",
@@ -74,7 +81,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
             QuasiStaticProblem(stack.enter_context(Spaces(mesh)), degree, Conditions(), element)
         )
         run = _mixed_run if element == "mixed" else _elastic_run
-        matrix, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), how, stack)
+        matrix, levels, once = run(problem, MaterialLaw.of_moduli(YOUNG, poisson), how, stack)
         runs, start = [], time.process_time()
         while len(runs) < repeats and (not runs or time.process_time() - start < _ENOUGH):
             before = _application(matrix)
@@ -89,6 +96,7 @@ def measure(element: str, degree: int, poisson: float, size: tuple[float, float]
             "poisson": poisson,
             "dofs": problem.dofs,
             "method": method,
+            "levels": levels,
             "iterations": iterations,
             "assemble": assemble,
             "setup": setup,
@@ -109,8 +117,17 @@ def case_of(degree: int, size: tuple[float, float]) -> Any:
     return parse(study(BOX, 0.3, DISC, mesh)).case(())
 
 
-def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
-    """Return the operator, and a function that assembles, sets up and solves once."""
+def levels_of(levels: list[Any]) -> str:
+    """Return the levels of a cycle, finest first, with the unknowns of the last, below which levels are algebraic.
+
+    Degrees are p, coarser meshes h.
+    """
+    names = ["h" if level.children is not None else f"p{level.degree}" for level in reversed(levels)]
+    return f"{', '.join(names)}: {levels[0].matrix.getSize()[0]:,d}"
+
+
+def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, str, Callable[[], Any]]:
+    """Return the operator, the levels, and a function that assembles, sets up and solves once."""
     from epsmesh.solve.balance import TOLERANCE
     from epsmesh.solve.compiled import vector
     from epsmesh.solve.linear_solver import LinearSolver
@@ -118,6 +135,8 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
     space = problem.elements.displacements
     unit = stack.enter_context(space.lend(law, entries=False))
     held = space.held(PRESS)
+    with problem.solver(law, method) as lent:
+        levels = "" if method == "direct" else levels_of(lent.levels)
 
     def once() -> tuple[float, float, float, int]:
         start = time.process_time()
@@ -135,10 +154,10 @@ def _elastic_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple
             solver.close()
             return made - start - (ready - made), ready - made, done - ready, iterations
 
-    return unit, once
+    return unit, levels, once
 
 
-def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, Callable[[], Any]]:
+def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[Any, str, Callable[[], Any]]:
     """Return the same for mixed elements; a set-up that serves all Poisson's ratios counts once."""
     from epsmesh.solve.balance import TOLERANCE
     from epsmesh.solve.elements.mixed import LAME
@@ -162,7 +181,7 @@ def _mixed_run(problem: Any, law: Any, method: str, stack: ExitStack) -> tuple[A
                 iterations = solver.solve(c, [column.right], [column.unknown], elements.stricter * TOLERANCE)
                 return assemble, ready - start, time.process_time() - ready, iterations
 
-    return unit, once
+    return unit, "" if direct else levels_of(saddle.levels), once
 
 
 def _application(matrix: Any) -> float:
@@ -232,6 +251,7 @@ def plan(largest: int) -> list[tuple[str, int, float, tuple[float, float], str]]
 def main() -> None:
     """Measure, print and write."""
     parser = options(__doc__)
+    parser.add_argument("--product", help="a row of the products, as JSON: in a process of its own")
     parser.add_argument("--one", help="a row, as JSON: what runs in a process of its own")
     parser.add_argument("--repeats", type=int, default=3, help="at most")
     parser.add_argument("--rows", type=int, help="the first of them only")
@@ -242,6 +262,9 @@ def main() -> None:
     if asked.one:
         measure(*json.loads(asked.one), repeats=asked.repeats)
         return
+    if asked.product:
+        print(json.dumps(products.product(*json.loads(asked.product))))
+        return
     table = Table(COLUMNS)
     for case in plan(asked.largest)[: asked.rows]:
         try:
@@ -250,8 +273,13 @@ def main() -> None:
             print(f"failed: {error}", file=sys.stderr)
     crossed = crossovers(table.rows)
     said = "".join(f"- {name}: {dofs} dofs\n" for name, dofs in crossed.items())
+    of_products = [
+        ask(["-m", "benchmarks.solvers", "--product", json.dumps(one)])
+        for one in PRODUCTS[: None if asked.rows is None else 1]
+    ]
     text = f"{markdown(table.rows, COLUMNS)}\nDirect and iterative take the same time at\n\n{said}"
-    write("solvers", asked.output, {"rows": table.rows, "crossover": crossed}, text)
+    text += f"\n## A product\n\n{markdown(of_products, products.COLUMNS)}"
+    write("solvers", asked.output, {"rows": table.rows, "crossover": crossed, "products": of_products}, text)
 
 
 if __name__ == "__main__":
