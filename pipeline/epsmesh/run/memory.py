@@ -18,7 +18,7 @@ _kept: list[bool] = []
 # bytes, and the free bytes that stay with the process. gmsh fills an array of 23 MB for each mesh, however small: a
 # tenth of the time of a small case, if the system gives its pages each time.
 _MOST_MAPPED, _MAPPED_FROM, _TRIMMED_FROM = -4, -3, -1
-_MAPPED_ARRAYS, _LARGE = 65_536, 2**25
+_MAPPED_ARRAYS, _LARGE, _FREE = 65_536, 2**27, 2**25
 # Garbage collections take at most one part in so many of the time, if waiting does no harm.
 _RARELY = 50
 _next: list[float] = [0.0]  # time (s) of the next one
@@ -55,7 +55,7 @@ def give_back(comm: MPI.Comm) -> None:
         return
     gc.collect()  # dolfinx's meshes hold communicators, and Python's cycles hold the meshes
     with suppress(AttributeError):
-        _C.malloc_trim(_LARGE)
+        _C.malloc_trim(_FREE)
     end = time.perf_counter()
     _next[0] = end + _RARELY * (end - start)
 

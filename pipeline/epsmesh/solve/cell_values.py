@@ -190,11 +190,15 @@ def clear_cells(body: BodyMesh, front: Front | None = None, *, wholly: bool = Fa
     footprint = x[np.unique(_nodes_of(body, {PROBE}))]
     inside = cKDTree(rim).query(footprint)[0] if len(rim) and len(footprint) else np.zeros(1)
     least = CLEAR * body.comm.allreduce(float(inside.max()), op=MPI.MAX)
-    centres = x[compat.geometry_dofs(body.mesh)[: body.owned_cells, :_CORNERS]].mean(axis=1)
-    edges = np.vstack([rim, _points_of(body, _on_edge(body, FIXED))])
     corners = x[compat.geometry_dofs(body.mesh)[: body.owned_cells, :_CORNERS]]
-    places = np.concatenate([centres[:, None], corners], axis=1) if wholly else centres[:, None]
-    clear = np.isinf(cKDTree(edges).query(places, distance_upper_bound=least)[0])
+    places = corners.mean(axis=1)[:, None]
+    if wholly:
+        places = np.concatenate([places, corners], axis=1)
+    clear = np.ones(places.shape[:2], dtype=bool)
+    for edges in (rim, _points_of(body, _on_edge(body, FIXED))):
+        if len(edges):  # most places are outside the box of what is near
+            near = ((places >= edges.min(axis=0) - least) & (places <= edges.max(axis=0) + least)).all(axis=2)
+            clear[near] &= np.isinf(cKDTree(edges).query(places[near], distance_upper_bound=least)[0])
     if front is not None:
         offset = places - np.array(front.point)
         clear &= np.hypot(offset @ np.array(front.normal), offset[..., 2] + front.depth) >= least
