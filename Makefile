@@ -111,19 +111,19 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 	$(PYTHON) -m benchmarks.peers
 	$(PYTHON) -m benchmarks.asked
 	$(PYTHON) -m benchmarks.plain_loop --sample 24
+	$(PYTHON) -m benchmarks.huge
+	$(PYTHON) -m benchmarks.speedup
 	$(PYTHON) -m benchmarks.shares
 	$(PYTHON) -m benchmarks.solvers
 	$(PYTHON) -m benchmarks.contact
 	$(PYTHON) -m benchmarks.large
 	$(PYTHON) -m benchmarks.organs
+	$(PYTHON) -m benchmarks.paths
 	$(PYTHON) -m benchmarks.influence
 	$(PYTHON) -m benchmarks.spread
 	$(PYTHON) -m benchmarks.posture
-	$(PYTHON) -m benchmarks.paths
-	$(PYTHON) -m benchmarks.huge
 	$(PYTHON) -m benchmarks.work_precision
 	$(PYTHON) -m benchmarks.drag --minutes 5
-	$(PYTHON) -m benchmarks.speedup
 
 peers: setup ## compare with NGSolve, scikit-fem and CalculiX the time for a true error, with NGSolve error bars (on an idle machine)
 	@scripts/peers.sh
