@@ -132,12 +132,18 @@ def _form_of_addresses(parts: Parts, mesh: Any, tags: Any, code: Code, kernels: 
 def _wrapped(code: Code, *arguments: Any) -> Any:
     """Return the C++ form made of ``arguments``, in dolfinx's own class for it, which keeps the code."""
     compiled, module, text = code
-    kind = getattr(cpp.fem, f"Form_{_SCALAR.name}")
     if not _IS_OLD:
-        return fem.Form(kind(*arguments), compiled, text, module)
-    made = type("Form", (fem.FormMetaClass, kind), {"__init__": kind.__init__})(*arguments)
+        return fem.Form(_form_class()(*arguments), compiled, text, module)
+    made = _form_class()(*arguments)
     made._ufcx_form, made._code = compiled, text
     return made
+
+
+@cache
+def _form_class() -> Any:
+    """Return the class of the C++ form, in old versions one that holds its code, too."""
+    kind = getattr(cpp.fem, f"Form_{_SCALAR.name}")
+    return type("Form", (fem.FormMetaClass, kind), {"__init__": kind.__init__}) if _IS_OLD else kind
 
 
 def kernels_of(code: Code) -> dict[int, int]:

@@ -11,7 +11,11 @@ import ufl
 
 def element(mesh: Any, family: str, degree: int, shape: tuple[int, ...] = ()) -> Any:
     """Return an element of scalars, vectors or tensors on the cells of ``mesh``."""
-    cell = mesh.ufl_cell()
+    return _element(mesh.ufl_cell(), family, degree, shape)
+
+
+@cache
+def _element(cell: Any, family: str, degree: int, shape: tuple[int, ...]) -> Any:
     if not hasattr(ufl, "VectorElement"):
         name = cell.cellname() if callable(cell.cellname) else cell.cellname
         return basix.ufl.element(family, name, degree, shape=shape)

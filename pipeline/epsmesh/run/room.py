@@ -4,6 +4,7 @@ import os
 import resource
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
 from math import inf, nan
 from pathlib import Path
 
@@ -37,19 +38,26 @@ def container_room(table: Path = Path("/proc/self/cgroup"), root: Path = Path("/
 
 def _rooms(table: Path, root: Path) -> Iterator[float]:
     with suppress(OSError):
-        for line in table.read_text().splitlines():
-            _, controllers, path = line.split(":", 2)
-            if controllers == "":
-                base, names = root, ("memory.max", "memory.current", "inactive_file")
-            elif "memory" in controllers.split(","):
-                base, names = root / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
-            else:
-                continue
-            group = base / path.strip("/")
-            # In a container the path is the machine's, but the container's own group is mounted.
-            for folder in (group, *group.parents):
-                if folder.is_relative_to(base):
-                    yield _room_of_group(folder, *names)
+        for group in _groups(table.read_text(), root):
+            yield _room_of_group(*group)
+
+
+@cache
+def _groups(text: str, root: Path) -> tuple[tuple[Path, str, str, str], ...]:
+    """Return the folders of the control groups in a table, and the names of their files."""
+    found: list[tuple[Path, str, str, str]] = []
+    for line in text.splitlines():
+        _, controllers, path = line.split(":", 2)
+        if controllers == "":
+            base, names = root, ("memory.max", "memory.current", "inactive_file")
+        elif "memory" in controllers.split(","):
+            base, names = root / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+        else:
+            continue
+        group = base / path.strip("/")
+        # In a container the path is the machine's, but the container's own group is mounted.
+        found += [(folder, *names) for folder in (group, *group.parents) if folder.is_relative_to(base)]
+    return tuple(found)
 
 
 def _room_of_group(folder: Path, limit_name: str, usage_name: str, cache_name: str) -> float:

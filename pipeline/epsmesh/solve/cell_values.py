@@ -241,4 +241,5 @@ def _node_of_vertex(body: BodyMesh) -> IntArray:
 
 def _gathered(comm: MPI.Comm, values: IntArray) -> IntArray:
     """Return the distinct ``values`` of all ranks; collective."""
-    return np.unique(np.concatenate(comm.allgather(np.unique(values))))
+    own = np.unique(values)
+    return own if comm.size == 1 else np.unique(np.concatenate(comm.allgather(own)))

@@ -191,6 +191,8 @@ def add_from_ghosts(values: PETSc.Vec) -> None:
 
 def global_sum(comm: MPI.Comm, values: FloatArray) -> FloatArray:
     """Return the sum of ``values`` over all ranks, entry by entry; collective."""
+    if comm.size == 1:
+        return np.array(values)
     total = np.empty_like(values)
     comm.Allreduce(np.ascontiguousarray(values), total)
     return total
@@ -233,7 +235,12 @@ def _options() -> dict[str, Any]:
 
 def form_cache() -> Path:
     """Return the cache folder of compiled forms; one for each processor type, since the code is built for it."""
-    return cache_folder() / "forms" / _processor()
+    return _of_forms(cache_folder())
+
+
+@cache
+def _of_forms(folder: Path) -> Path:
+    return folder / "forms" / _processor()
 
 
 @cache

@@ -81,13 +81,12 @@ class _Space:
 
     def __init__(self, comm: MPI.Comm):
         self._comm = comm
-        self._steps: list[Single] = []
-        self._directions: list[Single] = []
+        self._steps, self._directions = _Stored(), _Stored()
         self._columns: list[FloatArray] = []
         self._shares: list[float] = []
 
     def __len__(self) -> int:
-        return len(self._directions)
+        return len(self._directions.vectors)
 
     def store(self, step: FloatArray) -> None:
         """Store a preconditioned residual, scaled to magnitude 1, and write into ``step`` what was stored; collective.
@@ -101,7 +100,7 @@ class _Space:
             raise SolveError("the linear solver did not converge: its preconditioner broke down")
         call("to_single", count, 1 / scale, step, stored)
         call("to_double", count, 1.0, stored, step)
-        self._steps.append(stored)
+        self._steps.add(stored)
 
     def reduce(self, residual: FloatArray, image: FloatArray) -> None:
         """Minimise the norm of ``residual`` along the ``image`` of the last step, which is overwritten; collective.
@@ -109,8 +108,8 @@ class _Space:
         Raises:
             SolveError: if the space already contains the image.
         """
-        count, size = len(image), len(self._directions)
-        stored, products = _addresses(self._directions), np.zeros(size)
+        count, size = len(image), len(self)
+        stored, products = self._directions.array, np.zeros(size)
         call("project", count, size, stored, image, products)
         products = global_sum(self._comm, products)
         call("combine", count, size, stored, -products, image)
@@ -120,10 +119,11 @@ class _Space:
         direction = np.empty(count, dtype=np.float32)
         call("to_single", count, 1 / length, image, direction)
         share = np.zeros(1)
-        call("project", count, 1, _addresses([direction]), residual, share)
+        self._directions.add(direction)
+        last = self._directions.array[-1:]
+        call("project", count, 1, last, residual, share)
         share = global_sum(self._comm, share)
-        call("combine", count, 1, _addresses([direction]), -share, residual)
-        self._directions.append(direction)
+        call("combine", count, 1, last, -share, residual)
         self._columns.append(np.append(products, length))
         self._shares.append(float(share[0]))
 
@@ -135,8 +135,22 @@ class _Space:
             triangle[: number + 1, number] = column
         weights = np.linalg.solve(triangle, np.array(self._shares))
         result[:] = 0.0
-        call("combine", len(result), size, _addresses(self._steps), weights, result)
+        call("combine", len(result), size, self._steps.array, weights, result)
 
 
-def _addresses(vectors: list[Single]) -> np.ndarray:
-    return np.array([vector.ctypes.data for vector in vectors], dtype=np.uint64)
+class _Stored:
+    """Vectors, and their addresses, for C."""
+
+    def __init__(self) -> None:
+        self.vectors: list[Single] = []
+        self._addresses: list[int] = []
+
+    def add(self, vector: Single) -> None:
+        """Store a vector."""
+        self.vectors.append(vector)
+        self._addresses.append(vector.ctypes.data)
+
+    @property
+    def array(self) -> np.ndarray:
+        """The addresses."""
+        return np.array(self._addresses, dtype=np.uint64)

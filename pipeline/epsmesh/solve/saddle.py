@@ -21,6 +21,8 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conjugate_residuals import conjugate_residuals
 from epsmesh.solve.kernels.multigrid import Cycle
+from epsmesh.solve.kernels.pressure import CellPressures, matrix_of
+from epsmesh.solve.kernels.product import operator_of
 from epsmesh.solve.krylov import check_converged, explained, factorised, keep, solver_of
 from epsmesh.solve.linear_solver import Level, LinearSolver
 from epsmesh.stages import stage
@@ -122,12 +124,10 @@ class SaddleSolver:
 
     def _matrix(self, c: Weight, stack: ExitStack) -> PETSc.Mat:
         saddle = self._saddle
-        mass = keep(stack, _weighed(saddle.mass, -c))
-        transpose = PETSc.Mat()
-        if self._direct:
-            saddle.coupling.transpose(transpose)
-        else:
-            transpose.createTranspose(saddle.coupling)
+        if not self._direct:
+            return keep(stack, _Products(saddle, c).matrix())
+        mass, transpose = keep(stack, _weighed(saddle.mass, -c)), PETSc.Mat()
+        saddle.coupling.transpose(transpose)
         blocks = [[saddle.levels[-1].matrix, keep(stack, transpose)], [saddle.coupling, mass]]
         return keep(stack, PETSc.Mat().createNest(blocks, comm=saddle.mass.comm))
 
@@ -140,7 +140,8 @@ class SaddleSolver:
     def _preconditioner(self, c: Weight, stack: ExitStack) -> "_BlockTriangular":
         saddle = self._saddle
         assert self._multigrid.cycle is not None  # displacements have degree 2 or more
-        block = _BlockTriangular(self._multigrid.cycle, saddle.coupling, self._mass, c + _SCHUR / saddle.stiffness)
+        pressures = saddle.coupling.getPythonContext().pressures
+        block = _BlockTriangular(self._multigrid.cycle, pressures, self._mass, c + _SCHUR / saddle.stiffness)
         stack.callback(block.close)
         return block
 
@@ -152,6 +153,28 @@ class SaddleSolver:
         return ksp
 
 
+class _Products:
+    """The operator, cell by cell: a context for PETSc."""
+
+    def __init__(self, saddle: Saddle, c: Weight):
+        self._stiffness = operator_of(saddle.levels[-1].matrix)
+        self._pressures = saddle.coupling.getPythonContext().pressures
+        self._mass = saddle.mass.getPythonContext().weighted(-c)
+
+    def matrix(self) -> PETSc.Mat:
+        """Return the operator as a PETSc matrix; the caller destroys it; collective."""
+        size = 3 * self._stiffness.rows + self._pressures.ghosts.owned
+        return matrix_of(self, size, size, self._pressures.comm)
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product with ``x`` into ``y``; PETSc calls this."""
+        given, result, split = x.array_r, y.array_w, 3 * self._stiffness.rows
+        moved, pressed = given[:split], given[split:]
+        self._stiffness.product(moved, result[:split])
+        result[:split] += self._pressures.pull(pressed)
+        result[split:] = self._pressures.dilation(moved) + self._mass.product(pressed)
+
+
 class _BlockTriangular:
     """The preconditioner z_u = K₀⁻¹ r_u, z_p = −S⁻¹ t with t = r_p − B z_u, both inverses approximate.
 
@@ -159,35 +182,30 @@ class _BlockTriangular:
     energy, and the sum of magnitudes a norm of the error that does not depend on units.
     """
 
-    def __init__(self, cycle: Cycle, coupling: PETSc.Mat, mass: PETSc.KSP, schur: Weight):
-        self._cycle, self._coupling, self._mass, self._schur = cycle, coupling, mass, schur
-        self._rest = coupling.createVecLeft()
+    def __init__(self, cycle: Cycle, pressures: CellPressures, mass: PETSc.KSP, schur: Weight):
+        self._cycle, self._pressures, self._mass, self._schur = cycle, pressures, mass, schur
+        self._rest, self._found = mass.getOperators()[0].createVecs()
         self.energy = self.first_energy = 0.0
 
     def apply(self, _: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Apply the preconditioner; PETSc calls this."""
-        rest, given, written = self._rest, residual.array_r, result.array_w
-        split = len(given) - len(rest.array_r)
+        given, written, rest = residual.array_r, result.array_w, self._rest.array
+        split = len(given) - len(rest)
         self._cycle.correct(given[:split], written[:split])
-        with ExitStack() as stack:  # vectors without memory of their own
-            z_u, z_p = (
-                keep(stack, PETSc.Vec().createWithArray(part, comm=rest.comm))
-                for part in (written[:split], written[split:])
-            )
-            self._coupling.mult(z_u, rest)
-            rest.array[:] = given[split:] - rest.array
-            self._mass.solve(rest, z_p)
-        written[split:] *= -1 / self._schur
-        parts = np.array([given[:split] @ written[:split], rest.array @ written[split:]])
-        self.energy = float(np.abs(global_sum(rest.comm.tompi4py(), parts)).sum())
+        rest[:] = given[split:] - self._pressures.dilation(written[:split])
+        self._mass.solve(self._rest, self._found)
+        written[split:] = self._found.array_r * (-1 / self._schur)
+        parts = np.array([given[:split] @ written[:split], rest @ written[split:]])
+        self.energy = float(np.abs(global_sum(self._pressures.comm, parts)).sum())
 
     def refine_eigenvalues(self) -> bool:
         """Return False: GCR needs no definite preconditioner."""
         return False
 
     def close(self) -> None:
-        """Free the work vector."""
+        """Free the work vectors."""
         self._rest.destroy()
+        self._found.destroy()
 
 
 class _Factors:
@@ -274,8 +292,6 @@ class _EnergyTest:
 
 def _weighed(mass: PETSc.Mat, weight: Weight) -> PETSc.Mat:
     """Return a mass times a weight, which the caller destroys; pressures of different weights share no entry."""
-    if mass.getType() == "python":
-        return mass.getPythonContext().weighted(weight).matrix()
     mass = mass.copy()
     if isinstance(weight, float):
         mass.scale(weight)

@@ -74,16 +74,20 @@ class ElasticSpace:
         mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
         single = [(3 * probe + axis, axis) for axis in conditions.components]
         single += [(3 * plane + axis, axis) for axis, plane in mirrors]
-        zero = np.zeros((), dtype=PETSc.ScalarType)
-        self.dirichlet = [compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), fixed, space)]
-        self.dirichlet += [compat.dirichletbc(zero, dofs, space.sub(axis)) for dofs, axis in single]
-        self._probe, self._fixed, self._sides = probe, fixed, self._sides_of(probe)
+        self._probe, self._fixed, self._single, self._sides = probe, fixed, single, self._sides_of(probe)
         self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         of_blocks = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed, resting))
         self.probe_owned, self.fixed_owned, self.resting_owned = of_blocks
         self.forms = ElasticForms(space, body.regions, cell_kernel, self.factors)
         self.terms: list[Term] = [term.on(body, self.forms.displacement) for term in conditions.terms]
+
+    @cached_property
+    def dirichlet(self) -> list[Any]:
+        """The conditions for assembly."""
+        zero = np.zeros((), dtype=PETSc.ScalarType)
+        all_axes = compat.dirichletbc(np.zeros(3, dtype=PETSc.ScalarType), self._fixed, self.space)
+        return [all_axes, *(compat.dirichletbc(zero, dofs, self.space.sub(axis)) for dofs, axis in self._single)]
 
     @property
     def whole_dofs(self) -> int:

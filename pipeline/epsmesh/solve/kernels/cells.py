@@ -4,7 +4,7 @@ Curved cells use quadrature, as in dolfinx: each stores the gradient of its map 
 ``curved.c`` sums over these. The ghost exchange uses dolfinx's own vectors (:class:`Ghosts`).
 """
 
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import basix
@@ -192,6 +192,7 @@ def roots(points: FloatArray) -> FloatArray:
     return np.sign(determinants) * np.sqrt(np.abs(determinants))
 
 
+@cache
 def reference(degree: int, quadrature: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return weights, values (q, i) and gradients (a, q, i) of the functions of ``degree`` on the reference cell.
 

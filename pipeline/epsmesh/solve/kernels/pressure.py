@@ -109,24 +109,24 @@ class Coupling:
     """The operator B: a context for PETSc."""
 
     def __init__(self, pressures: CellPressures):
-        self._pressures = pressures
+        self.pressures = pressures
 
     def holding(self, dofs: Int32Array) -> "Coupling":
         """Return B with zero columns for owned ``dofs`` (unrolled), too."""
-        return Coupling(self._pressures.holding(dofs))
+        return Coupling(self.pressures.holding(dofs))
 
     def matrix(self) -> PETSc.Mat:
         """Return B as a PETSc matrix; the caller destroys it."""
-        of = self._pressures
+        of = self.pressures
         return matrix_of(self, of.ghosts.owned, 3 * of.cells.ghosts.owned, of.comm)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write B x into ``y``; PETSc calls this."""
-        y.array_w[:] = self._pressures.dilation(x.array_r)
+        y.array_w[:] = self.pressures.dilation(x.array_r)
 
     def multTranspose(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write Bᵀ x into ``y``; PETSc calls this."""
-        y.array_w[:] = self._pressures.pull(x.array_r)
+        y.array_w[:] = self.pressures.pull(x.array_r)
 
 
 class Mass:
@@ -146,7 +146,11 @@ class Mass:
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write M x into ``y``; PETSc calls this."""
-        y.array_w[:] = self.weight * self._pressures.weigh(x.array_r)
+        y.array_w[:] = self.product(x.array_r)
+
+    def product(self, x: FloatArray) -> FloatArray:
+        """Return M x for owned pressures."""
+        return np.asarray(self.weight * self._pressures.weigh(x))
 
     def getDiagonal(self, _: PETSc.Mat, y: PETSc.Vec) -> None:
         """Write the diagonal into ``y``; PETSc calls this."""

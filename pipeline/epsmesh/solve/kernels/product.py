@@ -225,7 +225,10 @@ class CellOperator:
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write A x into ``y``; PETSc calls this."""
-        given, result = x.array_r, y.array_w
+        self.product(x.array_r, y.array_w)
+
+    def product(self, given: FloatArray, result: FloatArray) -> None:
+        """Write A times ``given``, owned dofs, into ``result``."""
         values = given[self.prescribed]
         if values.any():
             given = given.copy()
