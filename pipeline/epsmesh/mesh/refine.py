@@ -15,6 +15,8 @@ from epsmesh.mesh.generate import FLAT, MeshArrays, MeshError
 from epsmesh.scene.model import MIRROR, PROBE
 from epsmesh.shapes.triangles import edge_keys, half_edges
 
+# Cells whose volumes are computed at once: their points fit into the cache.
+_AT_ONCE = 2**14
 # Mid nodes (of the ten of a cell) of the edges between two corners.
 _MID = {tuple(map(int, edge)): 4 + number for number, edge in enumerate(EDGES)}
 # Children at the corners.
@@ -92,6 +94,10 @@ def refined(mesh: MeshArrays) -> tuple[MeshArrays, IntArray]:
 
 def is_positive(points: FloatArray, cells: IntArray) -> bool:
     """Return whether all tetrahedra have a positive volume, and none is flat."""
+    return all(_are_positive(points, cells[start : start + _AT_ONCE]) for start in range(0, len(cells), _AT_ONCE))
+
+
+def _are_positive(points: FloatArray, cells: IntArray) -> bool:
     # By columns: numpy's determinants and extremes of small arrays take four times as long.
     a, b, c, d = (points[cells[:, corner]].T for corner in range(4))
     volume = determinants(np.stack([b - a, c - a, d - a]).swapaxes(1, 2))

@@ -9,13 +9,15 @@ import ufl
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import BoolArray
+from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.mesh.curve import EDGES
 from epsmesh.solve.compiled import quadrature_degree
 
 # Marks of cells, and the rounding error of an edge's bulge, in units of its length.
 _NEITHER, STRAIGHT, _CURVED = 0, 1, 2
 _FLAT = 1e-9
+# Cells that are looked at together: their points fit into the cache.
+_AT_ONCE = 2**14
 CURVED: WeakKeyDictionary[Any, BoolArray | None] = WeakKeyDictionary()
 MARKED: WeakKeyDictionary[Any, dict[bool, Any]] = WeakKeyDictionary()
 
@@ -80,11 +82,19 @@ def has_curved_cells(mesh: Any) -> bool:
 
 
 def _find_curved(mesh: Any) -> BoolArray | None:
-    nodes = compat.geometry_dofs(mesh)
+    nodes, points = compat.geometry_dofs(mesh), np.asarray(mesh.geometry.x)
     if nodes.shape[1] == 4:
         return None
-    points, bulge, length = mesh.geometry.x, np.zeros(len(nodes)), np.zeros(len(nodes))
-    for number, ends in enumerate(EDGES, start=4):  # one edge of all cells at a time fits into the cache
+    curved = np.empty(len(nodes), dtype=bool)
+    for start in range(0, len(nodes), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        curved[some] = _are_curved(points, nodes[some])
+    return curved
+
+
+def _are_curved(points: FloatArray, nodes: IntArray) -> BoolArray:
+    bulge, length = np.zeros(len(nodes)), np.zeros(len(nodes))
+    for number, ends in enumerate(EDGES, start=4):
         first, second = (points[nodes[:, end]] for end in ends)
         off = points[nodes[:, number]] - (first + second) / 2
         for most, values in ((bulge, off), (length, second - first)):
