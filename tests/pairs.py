@@ -270,6 +270,13 @@ def _grasp(study: Study) -> None:
     study["probe"] = [study["probe"] | {"together": "grasp"}, {"together": "grasp"}]
 
 
+def _pull(study: Study) -> None:
+    """Let the jaws of a grasp be pulled along y, stuck to the tissue unless it has friction."""
+    study["probe"] |= {"pull": "0.05 mm", "pull_direction": [0, 1, 0]}
+    study["probe"].setdefault("friction", "stick")
+    _grasp(study)
+
+
 _DRAW = """
 import sys, gmsh
 gmsh.initialize(); gmsh.option.setNumber("General.Terminal", 0)
@@ -357,6 +364,7 @@ FEATURES = (
     Feature("spread", "influence", _update("material", spread={"young": "30 %", "correlation_length": "5 mm"})),
     # The last one: from here on, a study has two tools.
     Feature("grasp", "grasp", _grasp),
+    Feature("pull", "grasp", _pull),
 )  # fmt: skip
 
 

@@ -78,6 +78,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
     tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
+    tail += [f"pull {case.probe.pulled}"] if case.probe.pulled else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), last, case.probe.half_width
@@ -139,6 +140,7 @@ def operator_key(case: Case) -> str:
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
+    rests += [f"pull {case.probe.pulled}"] if case.probe.pulled else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
     return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *rests, *fields, *shape])
 

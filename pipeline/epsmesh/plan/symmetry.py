@@ -28,13 +28,14 @@ def mirror_planes(case: Case) -> tuple[str, ...]:
 
 
 def movement_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of geometry and movement."""
-    return _movement(case.body, case.probe)
+    """Return the planes of symmetry of geometry and movement, that of jaws that are pulled included."""
+    pulled = dict(zip(PLANES, case.probe.pulled or (0.0, 0.0, 0.0), strict=False))
+    return tuple(plane for plane in _movement(case.body, case.probe) if pulled[plane] == 0)
 
 
 def slides_across(case: Case) -> bool:
     """Return whether the tool moves across a plane of symmetry: that movement has no force along the axis."""
-    lost = {*mirror_planes(case)} - {*movement_planes(case)}
+    lost = {*mirror_planes(case)} - {*_movement(case.body, case.probe)}
     fields = [tissue.varying for tissue in case.tissues if tissue.varying is not None]
     return any(all(field.is_mirrored(PLANES[plane]) for field in fields) for plane in lost)
 

@@ -21,8 +21,9 @@ from epsmesh.units import canonical
 _ENDED = "load steps end there"
 # Quantities with a bar that grow with the depth, no faster than F.
 _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
-# Forces of a second jaw, among the further numbers of a record.
-_FORCES_OF_JAW = ("jaw_force", *(f"jaw_force_vector_{axis}" for axis in "xyz"))
+# Forces of two jaws, among the further numbers of a record.
+_OF_JAWS = ("jaw_force", "closed_force", "pull_force", "jaw_pull_force", "slip_begins_force", "slip_whole_force")
+_FORCES_OF_JAWS = (*_OF_JAWS, *(f"jaw_force_vector_{axis}" for axis in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     force = canonical(found.times * record.force)
     off = max(found.exponent, 1.0) * found.error / found.depth
     barred = _barred(record, off)
-    of_jaw = {name: found.times * barred.largest[name] for name in barred.largest if name in _FORCES_OF_JAW}
+    of_jaw = {name: found.times * barred.largest[name] for name in barred.largest if name in _FORCES_OF_JAWS}
     largest = barred.largest | of_jaw
     return replace(barred, force=force, force_vector=(x, y, z), energy=energy, largest=largest)
 
@@ -132,10 +133,13 @@ def _made(plan: Plan, depths: Mapping[tuple[int, ...], float], *, is_last: bool 
 def _trial(plan: Plan, case: Case, record: Record) -> Trial:
     """Return what is known of a case at a trial depth; where load steps ended, at the depth that they reached."""
     here = record.scaled(plan.scale_of(case))
-    if here.status == PARTIAL:
+    if here.status == PARTIAL and case.probe.pull is None:
         return Trial(here.depth_reached, here.force_reached, message=_ENDED, is_end=True)
+    if here.status == PARTIAL:  # the jaws closed, and the pull ended
+        return Trial(case.probe.depth, here.force_reached)
     if here.status in (OK, FAILED) and isfinite(here.force):
-        return Trial(case.probe.depth, here.force, here.force_error)
+        # Jaws that are pulled have closed to the force before.
+        return Trial(case.probe.depth, here.largest.get("closed_force", here.force), here.force_error)
     why = here.message if here.status != SKIPPED else "it was skipped"
     return Trial(case.probe.depth, nan, message=why)
 

@@ -16,7 +16,7 @@ from epsmesh.run.record import Record
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import ContactResult, PullResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import is_fine, is_graded, unresolved
 from epsmesh.solve.history import History
@@ -66,7 +66,8 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy=solution.energy,
         energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
-        largest=solution.largest | (_of_jaw(case, solution.contact) if case.jaw else of_rest(solution)),
+        largest=solution.largest
+        | (_of_jaw(case, solution.contact, bar / abs(force)) if case.jaw else of_rest(solution)),
         **_of_contact(solution.contact, has_history=solution.history is not None),
         **_of_loads(case, solution),
         balance=solution.balance,
@@ -132,8 +133,11 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
     return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
 
 
-def _of_jaw(case: Case, contact: ContactResult | None) -> dict[str, float]:
-    """Return what a record has of a second jaw, by the names in the dataset: forces are those of the tissue on it."""
+def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, float]:
+    """Return what a record has of a second jaw, by the names in the dataset: forces are those of the tissue on it.
+
+    ``bar`` is the relative one on the force along the axis.
+    """
     if contact is None or contact.rest is None:
         return {}
     rest = contact.rest
@@ -146,8 +150,28 @@ def _of_jaw(case: Case, contact: ContactResult | None) -> dict[str, float]:
         "jaw_contact_area_error": rest.bar * rest.area,
         "jaw_torque": rest.torque,
         "jaw_torque_error": rest.torque_bar,
+        **_of_pull(contact.pull, bar),
         **{f"jaw_force_vector_{axis}": part for axis, part in zip("xyz", vector, strict=True)},
     }
+
+
+def _of_pull(pull: PullResult | None, bar: float) -> dict[str, float]:
+    """Return what a record has of jaws that are pulled, by the names in the dataset: NaN without slip.
+
+    ``bar`` is the relative one on forces along the axis.
+    """
+    if pull is None:
+        return {}
+    first, second = pull.forces
+    found = {"pull_work": pull.work, "friction_work": pull.heat, "pull_energy": pull.stored}
+    found |= {"closed_force": pull.closed, "closed_force_error": bar * abs(pull.closed)}
+    for name, force in (("pull_force", first), ("jaw_pull_force", second)):
+        found |= {name: force, f"{name}_error": pull.bar * abs(force)}
+    for name, slip in (("slip_begins", pull.begins), ("slip_whole", pull.whole)):
+        parts = (nan,) * 4 if slip is None else (slip.at, slip.at_bar, slip.force, slip.force_bar)
+        names = (name, f"{name}_error", f"{name}_force", f"{name}_force_error")
+        found |= dict(zip(names, parts, strict=True))
+    return found
 
 
 def of_rest(solution: Solution) -> dict[str, float]:

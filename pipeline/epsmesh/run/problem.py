@@ -143,8 +143,17 @@ def conditions_of(case: Case) -> Conditions:
 def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     *_, first = first_touch(case.body, case.probe, case.frame)
-    tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case))
+    tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case), pull=_pull_of(case))
     return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
+
+
+def _pull_of(case: Case) -> Vector | None:
+    """Return how far (m) the jaws are pulled, for the same mesh."""
+    pulled, turn = case.probe.pulled, case.frame.turn
+    if pulled is None or turn is None:
+        return pulled
+    x, y, z = map(float, turn @ np.array(pulled))
+    return x, y, z
 
 
 def beds_on(case: Case) -> tuple[str, ...]:

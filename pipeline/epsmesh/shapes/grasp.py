@@ -6,8 +6,11 @@ from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.contact import is_flat
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.section import in_mm
 
 _MANY = 10_000  # places of a large study
+# Cosine between a pull and the jaws' axis: rounding.
+_ALONG = 1e-9
 
 
 @lru_cache(_MANY)
@@ -19,6 +22,24 @@ def opposite(body: Body, probe: Probe) -> Probe | None:
     frame = probe.frame_on(body)
     x, y, z = (p + a * body.thickness(frame) for p, a in zip(frame.point, frame.axis, strict=True))
     return jaw.model_copy(update={"at": (x, y, z), "axis": None})
+
+
+def check_pull(body: Body, probe: Probe) -> None:
+    """Check that a pull of both jaws is along their faces, and leaves them on these.
+
+    Raises:
+        PlaceError: if not.
+    """
+    pulled, jaw = probe.pulled, opposite(body, probe)
+    if pulled is None or jaw is None:
+        return
+    assert probe.pull is not None
+    frame = probe.frame_on(body)
+    if abs(sum(p * a for p, a in zip(pulled, frame.axis, strict=True))) > _ALONG * probe.pull:
+        raise PlaceError("must be along the faces that the jaws press on, across their axis", "pull_direction")
+    room = min(probe.gap(body, frame), jaw.gap(body, jaw.frame_on(body)))
+    if probe.pull >= room:
+        raise PlaceError(f"must be below {in_mm(room)}: it takes the jaws over the edge of their faces", "pull")
 
 
 def check_opposite(body: Body, probe: Probe) -> None:

@@ -15,6 +15,7 @@ from epsmesh.shapes.footprint import Footprint
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.friction import STICK, Friction
 from epsmesh.shapes.history import History
+from epsmesh.shapes.pulled import Pulled
 from epsmesh.shapes.revolved import Revolved
 from epsmesh.shapes.section import Problems, Words, in_mm
 from epsmesh.shapes.slit import Slit
@@ -36,7 +37,7 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
     return at
 
 
-class Probe(Footprint):
+class Probe(Pulled, Footprint):
     """A tool: its place, its movement, and its shape.
 
     The footprint is the part of the surface that moves with the tool. With unknown contact area (``is_unilateral``) it

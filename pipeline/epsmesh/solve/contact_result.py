@@ -23,7 +23,8 @@ class ContactResult:
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere
     the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
     bar by the size of elements there. ``rest`` is what a support that lets go, or a second jaw, does. ``shift`` (m) is
-    how far loads move the place of contact across the axis, NaN where the tool follows.
+    how far loads move the place of contact across the axis, NaN where the tool follows. ``pull`` is what jaws do that
+    are pulled.
     """
 
     area: float
@@ -42,6 +43,7 @@ class ContactResult:
     at_edge: float = 0.0
     shift: float = nan
     rest: "RestResult | None" = None
+    pull: "PullResult | None" = None
 
     @property
     def radius(self) -> float:
@@ -98,6 +100,46 @@ class RestResult:
         if isnan(self.force_bar):
             return self
         return replace(self, bar=max(self.bar, share), force_bar=max(self.force_bar, share))
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Slip of two jaws begins when they are pulled ``at`` (m) by a ``force`` (N) of both, each with its bar."""
+
+    at: float
+    at_bar: float
+    force: float
+    force_bar: float
+
+    def with_bar(self, relative: float) -> "Slip":
+        """Return it with bars that cover a ``relative`` error of the stiffness along the pull, too."""
+        more = relative * abs(self.force)
+        return replace(self, at_bar=self.at_bar + relative * self.at, force_bar=self.force_bar + more)
+
+
+@dataclass(frozen=True)
+class PullResult:
+    """Two jaws that have been pulled: ``forces`` (N) of each along the pull, with a relative 95 % ``bar``.
+
+    ``closed`` (N) is the force on the first one along its axis before.
+
+    Slip ``begins`` at the first node, and is that of the ``whole`` contact of both; None if it is not. ``work`` (J) of
+    the jaws is the ``heat`` of friction and what the tissue has ``stored``, from the beginning of the pull on.
+    """
+
+    forces: tuple[float, float]
+    begins: Slip | None
+    whole: Slip | None
+    work: float
+    heat: float
+    stored: float
+    closed: float
+    bar: float = nan
+
+    def with_bar(self, relative: float) -> "PullResult":
+        """Return it with a ``relative`` bar on forces."""
+        begins, whole = (slip and slip.with_bar(relative) for slip in (self.begins, self.whole))
+        return replace(self, begins=begins, whole=whole, bar=relative)
 
 
 @dataclass(frozen=True)

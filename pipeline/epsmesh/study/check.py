@@ -6,7 +6,7 @@ Each shape checks its own keys. This module checks combinations of sections.
 import itertools
 from collections.abc import Sequence
 from math import prod
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -174,6 +174,13 @@ def warn_of_depth(probe: Probe, problems: Problems) -> None:
             "assumes small strains: before the puncture, and at the blade's tip, linear elasticity is an extrapolation",
         )
         return
+    if probe.pull is not None and probe.pull > LINEAR * probe.contact_width:
+        problems.warn(
+            "probe.pull",
+            in_mm(probe.pull),
+            f"is {probe.pull / probe.contact_width:.0%} of the half width of contact. Above {LINEAR:.0%}, use a law "
+            "of large displacements: it follows jaws over the tissue, and a linear one leaves the contact in its place",
+        )
     found = Problems()
     probe.warn_of_strains(found)
     for one in found.warnings:
@@ -247,7 +254,7 @@ def _has_place(probe: Probe, problems: Problems) -> bool:
     """Report vectors without a direction, and return whether there is none."""
     sane = True
     with problems.about(probe=probe):
-        for key in ("axis", "direction"):
+        for key in ("axis", "direction", "pull_direction"):
             vector = getattr(probe, key, None)
             if vector is not None and not is_direction(vector):
                 problems.error(f"probe.{key}", list(vector), "must be a vector of three finite numbers, not all zero")
@@ -272,12 +279,17 @@ def _check_place(
         return True
     found = getattr(probe, error.key)
     if error.key != "at":
-        problems.error(f"probe.{error.key}", found and list(found), str(error))
+        problems.error(f"probe.{error.key}", _written(found), str(error))
     elif way is None:
         problems.error("probe.at", [in_mm(x) for x in found], str(error))
     elif way.off != "no contact":
         refused.setdefault((body.name, probe.name, str(error)), []).append(probe)
     return False
+
+
+def _written(found: Any) -> Any:
+    """Return a value of a probe as messages have it."""
+    return in_mm(found) if isinstance(found, float) else found and list(found)
 
 
 def _check_way(

@@ -15,7 +15,10 @@ JAW = "jaw"
 _NOT_TOGETHER = ("insertion",)
 NOT_CLOSED = "is not computed where two jaws close"
 # Keys of the first jaw alone: both have the same place, axis and friction.
-_OF_FIRST = ("at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths")
+_OF_FIRST = (
+    "at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths",
+    "pull", "pull_direction",
+)  # fmt: skip
 
 
 def with_jaws(raw: Any, problems: Problems) -> Any:
@@ -92,5 +95,5 @@ def jaw_of(first: dict[str, Any]) -> Probe:
 def _known(first: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     """Return the keys that a second jaw has of the first, beside its ``own``: those of the shape, if both have it."""
     is_same = own.get("shape", first["shape"]) == first["shape"]
-    inherited = (key for key in first if key not in own and key not in (JAW, "path"))
+    inherited = (key for key in first if key not in own and key not in (JAW, "path", "pull", "pull_direction"))
     return {key: first[key] for key in inherited if is_same or key in Probe.model_fields}

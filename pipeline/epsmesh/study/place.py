@@ -9,7 +9,7 @@ from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import check_contact, check_first_touch, edge_gap, is_level, lifted_edge
 from epsmesh.shapes.frame import Frame, PlaceError
 from epsmesh.shapes.from_file import FromFile
-from epsmesh.shapes.grasp import check_opposite, opposite
+from epsmesh.shapes.grasp import check_opposite, check_pull, opposite
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.section import in_mm
 
@@ -79,6 +79,7 @@ def _check_jaw(body: Body, probe: Probe, jaw: Probe) -> None:
     if jaw.gap(body, frame) <= _TOUCHING * body.extent:
         raise PlaceError(f"of the second jaw, {_footprint(jaw)} must be inside one face, not on or over its edge")
     check_opposite(body, probe)
+    check_pull(body, probe)
     if held_gap(body, jaw, frame) <= _TOUCHING * body.extent:
         raise PlaceError(f"of the second jaw, {_footprint(jaw)} must not reach the support of the body")
 

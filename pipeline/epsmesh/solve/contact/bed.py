@@ -69,6 +69,19 @@ class Bed:
 
         return replace(self, distance=distance)
 
+    def moved(self, by: FloatArray) -> "Bed":
+        """Return the jaw elsewhere, ``by`` (3), m."""
+        height, ends_at = self.height, self.ends_at
+        assert height is not None and ends_at is not None
+        x, y, z = map(float, np.array(self.foot) + by)
+        return replace(
+            self,
+            distance=lambda points, depth: self.distance(points - by, depth),
+            height=lambda points: height(points - by),
+            ends_at=lambda points: ends_at(points - by),
+            foot=(x, y, z),
+        )
+
     def advanced(self, change: float) -> "Bed":
         """Return the bed where the tool is farther by ``change`` (m)."""
         height = self.height

@@ -24,7 +24,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.contact.checks import check_edge, check_energy, check_support, force_of
+from epsmesh.solve.contact.checks import check_energy, check_support, force_of
 from epsmesh.solve.contact.contact_steps import (
     ContactPath,
     ContactPathPoint,
@@ -37,7 +37,9 @@ from epsmesh.solve.contact.corrections import Corrections
 from epsmesh.solve.contact.deformed import first_set, solve_contact
 from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
-from epsmesh.solve.contact.placed import placed_tool
+from epsmesh.solve.contact.placed import check_edges, placed_tool
+from epsmesh.solve.contact.pull import STEPS as PULL_STEPS
+from epsmesh.solve.contact.pull import Pull, bar_of_pull, force_across, pull_jaws
 from epsmesh.solve.contact.rest import Rest, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
@@ -127,19 +129,29 @@ class LargeContact:
         body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
         friction = Friction.on(body, self._tool, depth)
         found, iterations = list[ContactSolution](), 0
-        for steps in (self.STEPS // 2, self.STEPS):
+        pulls = list[Pull]()
+        for share in (2, 1):
             path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
             try:
                 iterations += reach_contact_with_friction(
-                    body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, steps
+                    body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, self.STEPS // share
                 )
             except LargeError as error:
                 raise stopped(body, path, depth, error, self._tool.friction) from error
-            assert path.last.touched is not None
-            found.append(path.last.touched)
-        body.state = path.last.state
+            touched = path.last.touched
+            assert touched is not None
+            body.state = path.last.state
+            if tool.pull is not None:
+                pulls.append(pull_jaws(body, tool, depth, touched, friction, PULL_STEPS // share))
+                touched = pulls[-1].end.touched
+                iterations += sum(step.touched.iterations for step in pulls[-1].steps[1:])
+            found.append(touched)
         coarse, fine = found
-        return replace(smooth, touched=fine, beside=Beside(smooth, state, coarse)), iterations
+        beside = Beside(smooth, state, coarse)
+        if not pulls:
+            return replace(smooth, touched=fine, beside=beside), iterations
+        there = self._tool if self._law.is_linear else self._tool.moved(np.array(tool.pull))
+        return replace(smooth, tool=there, touched=fine, beside=replace(beside, pulls=tuple(pulls))), iterations
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
@@ -151,11 +163,15 @@ def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """Beside contact with friction: that without, ``smooth``, with its ``state``; and the one from half the steps."""
+    """Beside contact with friction: that without, ``smooth``, with its ``state``; and the one from half the steps.
+
+    ``pulls`` are those in half the steps, and in all, of jaws that are pulled.
+    """
 
     smooth: "LargeContactSolution"
     state: FloatArray
     coarse: ContactSolution
+    pulls: tuple[Pull, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +229,10 @@ class LargeContactSolution:
         """Return the whole contact, with the effects of loads."""
         stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
         found = self.surface_contact.result(self.sagged.sag, stored)
-        return replace(found, rest=self.rests[0].result()) if self.rests else found
+        found = replace(found, rest=self.rests[0].result()) if self.rests else found
+        if self.beside is None or not self.beside.pulls:
+            return found
+        return replace(found, pull=self.beside.pulls[-1].result(2.0 ** len(self.body.elements.body.mirrored)))
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -223,12 +242,7 @@ class LargeContactSolution:
             ContactError: if contact reaches the support or the edge of the candidates.
         """
         check_support(self.body, self.touched)
-        tool = self.body.part()
-        check_edge(self.tool.ends_at, tool.candidates, tool.of(self.touched.active))
-        for number, bed in enumerate(self.tool.beds, start=1):
-            if bed.ends_at is not None:
-                part = self.body.part(number)
-                check_edge(bed.ends_at, part.candidates, part.of(self.touched.active))
+        check_edges(self.body, self.tool, self.touched)
         check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:
@@ -239,6 +253,8 @@ class LargeContactSolution:
         support += sum(float(bed.force[2]) for bed in self.rests)
         support -= float(self.body.on_terms[2])
         balance = abs(support / self.force - 1)
+        if self.beside is not None and self.beside.pulls:
+            balance = max(balance, force_across(self.body, self.touched) / self.force)
         check_balance(balance)
         on_probe = self.surface_contact.touched.forces.sum(axis=0)[None] / self.depth
         return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)
@@ -258,7 +274,11 @@ class LargeContactSolution:
             self.body.state = self.beside.state
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
             self.body.state = state
-            return half_the_steps(found, self.surface_contact, smooth.force)
+            found = half_the_steps(found, self.surface_contact, smooth.force)
+            if not self.beside.pulls:
+                return found
+            above = (self.body, self.surface, self.beside.smooth.tool, self.depth, LargeContact.STEPS // 2)
+            return replace(found, pull_bar=bar_of_pull(self.beside.pulls, *above, stack))
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])

@@ -5,9 +5,10 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.bed import Resting
+from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
-from epsmesh.solve.contact.touching import PlacedTool
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
@@ -41,6 +42,18 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
     if body.law.is_linear:
         beds = tuple(bed.at_rest(body.part(n).candidates.points) for n, bed in enumerate(tool.beds, start=1))
     return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool))
+
+
+def check_edges(body: DeformedBody, tool: Tool, touched: ContactSolution) -> None:
+    """Check that what has ``touched`` ends within the candidates of each contact, or where a tool or a jaw does.
+
+    Raises:
+        ContactError: if not.
+    """
+    for number, ends_at in enumerate([tool.ends_at, *(bed.ends_at for bed in tool.beds)]):
+        if ends_at is not None:
+            part = body.part(number)
+            check_edge(ends_at, part.candidates, part.of(touched.active))
 
 
 def _resting(body: DeformedBody, tool: Tool) -> Resting:

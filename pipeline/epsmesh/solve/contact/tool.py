@@ -32,7 +32,7 @@ class Tool:
     ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
     ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis. ``beds`` are
     the surfaces that touch the body besides, ``begins`` (n) the nodes of all that touch before the tool does; None for
-    all above supports.
+    all above supports. Once at its depth, it moves by ``pull`` (m), with the second jaws among the beds.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -45,6 +45,7 @@ class Tool:
     normal: Vector | None = None
     beds: tuple[Bed, ...] = ()
     begins: BoolArray | None = None
+    pull: Vector | None = None
 
     @property
     def rubs(self) -> bool:
@@ -93,6 +94,18 @@ class Tool:
             return replace(found, gap=found.gap - change * self.normal[2])
 
         return replace(self, distance=distance, beds=tuple(bed.advanced(change) for bed in self.beds))
+
+    def moved(self, by: FloatArray) -> "Tool":
+        """Return the tool and its second jaws elsewhere, ``by`` (3), m, and not farther along their axes."""
+        x, y, _ = map(float, np.array([*self.foot, 0.0]) + by)
+        return replace(
+            self,
+            height=lambda points: self.height(points - by),
+            ends_at=lambda points: self.ends_at(points - by),
+            distance=lambda points, depth: self.distance(points - by, depth),
+            foot=(x, y),
+            beds=tuple(bed if bed.is_support else bed.moved(by) for bed in self.beds),
+        )
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
         """Return the torque (N m) of the tissue on the tool about its advance, −z.

@@ -56,6 +56,7 @@ class HierarchicalEstimate:
     ``at_edge`` what the size of the elements at its edge has of it.
     ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
     ``rest_force_bar`` that on the force of such a jaw.
+    ``pull_bar`` is the relative one on forces along a pull.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
@@ -70,6 +71,7 @@ class HierarchicalEstimate:
     rest_bar: float = nan
     rest_force_bar: float = nan
     friction_bar: float = 0.0
+    pull_bar: float = nan
     is_solved: bool = False
 
 

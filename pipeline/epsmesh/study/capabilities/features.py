@@ -17,6 +17,7 @@ from epsmesh.shapes.insertion import Inserted
 from epsmesh.shapes.probe import STICK, Probe
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import in_mm
+from epsmesh.shapes.support import NONE
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.loads import Load
@@ -294,6 +295,12 @@ FEATURES: dict[str, Feature] = {
     "grasp": Feature("probe.together", lambda s: s.probe.jaw is not None),
     "prescribed footprint of a grasp": Feature(
         "probe.contact", lambda s: s.probe.jaw is not None and not s.probe.is_unilateral
+    ),
+    "pull": Feature("probe.pull", lambda s: s.probe.pull is not None, write=in_mm),
+    "pull of one tool": Feature("probe.pull", lambda s: s.probe.pull is not None and s.probe.jaw is None),
+    "pull without friction": Feature("probe.pull", lambda s: s.probe.pull is not None and s.probe.friction == 0),
+    "pull of a body that is not held": Feature(
+        "probe.pull", lambda s: s.probe.pull is not None and s.body.fixed == NONE and not s.load.terms, ("body", "load")
     ),
     "jaw with a sharp edge": Feature(
         "probe.contact", lambda s: s.probe.jaw is not None and s.probe.jaw.is_flat, write=lambda _: None

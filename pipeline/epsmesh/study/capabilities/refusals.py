@@ -300,6 +300,17 @@ REFUSALS: tuple[Refusal, ...] = (
         f'must have a rounded edge {_OF_LAW}, such as edge = "0.2 mm": at a sharp one the direction of the contact '
         "force has no limit",
     ),
+    Refusal(
+        "pull",
+        "pull of one tool",
+        "moves both jaws of a grasp: add a second [[probe]] table with `together`, or omit it",
+    ),
+    Refusal("pull", "pull without friction", 'needs jaws that hold the tissue: give friction, or "stick", or omit it'),
+    Refusal(
+        "pull",
+        "pull of a body that is not held",
+        'would move the whole body without force: give body.fixed, such as "sides"',
+    ),
     Refusal("support that lets go", "grasp", "is not computed with two jaws: give body.fixed, or omit `together`"),
     Refusal("grasp", "accuracy", "has two contacts, for which meshes of an accuracy are not made: give sizes"),
     Refusal("loads", "grasp", f"would move the body before both jaws touch it: {_NO_LOADS}, or omit `together`"),

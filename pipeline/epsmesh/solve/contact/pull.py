@@ -1,0 +1,227 @@
+"""Jaws that have closed, and are then pulled along the surface together: force, slip, and work.
+
+The pull is a load path of its own, from the equilibrium of the closed jaws on. Nodes that stick move with the tool.
+With a linear law the gaps stay those above the undeformed places: the pull is small beside the contact.
+"""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.contact.checks import force_of
+from epsmesh.solve.contact.contact_steps import (
+    ContactPath,
+    ContactPathPoint,
+    Friction,
+    reach_contact,
+    reach_contact_with_friction,
+)
+from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.placed import check_edges, placed_tool
+from epsmesh.solve.contact.sagged import sagged_body
+from epsmesh.solve.contact.tissue import DeformedBody
+from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
+from epsmesh.solve.contact_result import PullResult, Slip
+from epsmesh.solve.newton import LargeError
+
+# Steps of a pull, of equal lengths.
+STEPS = 16
+# Largest share of the work of a pull that is neither heat nor stored. Steps of a sixteenth leave below a thousandth.
+_LOST = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class PullStep:
+    """Jaws that have ``moved`` (m): what has ``touched``, and of each contact the force on the tissue along the pull
+    (N, of the modelled part) and the share of its area that slides."""
+
+    moved: float
+    touched: ContactSolution
+    forces: tuple[float, ...]
+    shares: tuple[float, ...]
+
+    @property
+    def force(self) -> float:
+        """The force (N) of all contacts on the modelled part."""
+        return sum(self.forces)
+
+    @property
+    def sliding(self) -> BoolArray:
+        """The nodes (n) that slide."""
+        slide = self.touched.slide
+        return self.touched.active & (slide.sliding if slide is not None else False)
+
+
+@dataclass(frozen=True, eq=False)
+class Pull:
+    """The ``steps`` of a pull, the first of which is its beginning, where the force on the first jaw is ``closed`` (N).
+
+    Energies (J) are the ``work`` of the jaws, the ``heat`` of friction, and what the tissue has ``stored``, all of the
+    modelled part.
+    """
+
+    steps: tuple[PullStep, ...]
+    work: float
+    heat: float
+    stored: float
+    closed: float
+
+    @property
+    def end(self) -> PullStep:
+        """The last step."""
+        return self.steps[-1]
+
+    def change(self, other: "Pull") -> float:
+        """Return the largest relative change of a jaw's force at the end to that of an ``other`` pull."""
+        pairs = zip(self.end.forces, other.end.forces, strict=True)
+        return max(abs(again / own - 1) for own, again in pairs)
+
+    def result(self, images: float) -> PullResult:
+        """Return that of the whole body, of which the modelled part has so many ``images``."""
+        slid = self.steps[0].sliding
+        begins = self._slip(lambda step: bool((step.sliding & ~slid).any()), images)
+        whole = self._slip(lambda step: min(step.shares) == 1.0, images)
+        first, second = (images * force for force in self.end.forces)
+        of_whole = (images * value for value in (self.work, self.heat, self.stored, self.closed))
+        return PullResult((first, second), begins, whole, *of_whole)
+
+    def _slip(self, has_slipped: Callable[[PullStep], bool], images: float) -> Slip | None:
+        """Return between which steps slip begins, None if it does not."""
+        for before, after in zip(self.steps[:-1], self.steps[1:], strict=True):
+            if has_slipped(after):
+                ways, forces = (before.moved, after.moved), (images * before.force, images * after.force)
+                return Slip(sum(ways) / 2, abs(ways[1] - ways[0]) / 2, sum(forces) / 2, abs(forces[1] - forces[0]) / 2)
+        return None
+
+
+def pull_jaws(
+    body: DeformedBody, tool: Tool, depth: float, touched: ContactSolution, friction: Friction, steps: int
+) -> Pull:
+    """Pull a ``tool`` and its second jaws, which have ``touched`` the body at a ``depth`` (m); collective.
+
+    Raises:
+        LargeError: if a step becomes too small.
+    """
+    assert tool.pull is not None
+    way = np.array(tool.pull)
+    length, count = float(np.linalg.norm(way)), 1 + len(tool.beds)
+    along = way / length
+
+    def moved_tool(moved: float) -> Tool:
+        return tool if body.law.is_linear else tool.moved(moved * along)
+
+    def tool_at(moved: float) -> PlacedTool:
+        return placed_tool(body, moved_tool(moved), depth)
+
+    rubs = replace(friction, advance=np.tile(along, (len(body.fixed), 1)), is_closed=True)
+    path, energy, work, heat = ContactPath(ContactPathPoint(0.0, body.state, touched)), body.energy, 0.0, 0.0
+    found, places = [_step(body, count, 0.0, touched, along)], body.positions()
+    for number in range(1, steps + 1):
+        path.step, moved = np.inf, length * number / steps
+        try:
+            reach_contact(body, tool_at, path, moved, rubs)
+            now = path.last.touched
+            assert now is not None
+            check_edges(body, moved_tool(moved), now)
+        except SolveError as error:
+            raise _ended(error, found[-1], body, depth, length) from error
+        before, after, here = found[-1], _step(body, count, moved, now, along), body.positions()
+        work += (after.moved - before.moved) * (before.force + after.force) / 2
+        slips = here - places - (after.moved - before.moved) * along
+        normal = before.touched.normal + now.normal
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        slips -= np.einsum("ni,ni->n", slips, normal)[:, None] * normal
+        heat -= float(((before.touched.forces + now.forces) * slips).sum()) / 2
+        places = here
+        found.append(after)
+    result = Pull(tuple(found), work, heat, body.energy - energy, force_of(body.part().solution(touched)))
+    if not abs(result.work - result.heat - result.stored) <= _LOST * (abs(result.heat) + abs(result.stored)):
+        raise LargeError(
+            f"the work of the pull, {result.work:.3g} J, is not what friction turns into heat, {result.heat:.3g} J, "
+            f"and what the tissue stores, {result.stored:.3g} J"
+        )
+    return result
+
+
+def close_and_pull(body: DeformedBody, tool: Tool, depth: float, closing: int, pulling: int) -> Pull:
+    """Close a ``tool`` and its second jaws up to a ``depth`` (m) on a ``body`` in its state, then pull; collective.
+
+    Steps of ``closing`` and of ``pulling`` are so many at least.
+
+    Raises:
+        LargeError: if a step becomes too small.
+    """
+    path, friction = ContactPath(ContactPathPoint(0.0, body.state)), Friction.on(body, tool, depth)
+    reach_contact_with_friction(body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, closing)
+    assert path.last.touched is not None
+    body.state = path.last.state
+    return pull_jaws(body, tool, depth, path.last.touched, friction, pulling)
+
+
+def bar_of_pull(
+    pulls: tuple[Pull, ...],
+    body: DeformedBody,
+    surface: Surface,
+    tool: Tool,
+    depth: float,
+    closing: int,
+    stack: ExitStack,
+) -> float:
+    """Return the relative 95 % bar on forces along ``pulls`` in half the steps, and in all of them; collective.
+
+    It is the change by half the steps, and the change of these in elements of one degree more, in which jaws close in
+    so many steps, ``closing``. The ``stack`` frees what is made.
+
+    Raises:
+        LargeError: if the next degree fails.
+    """
+    coarse, fine = pulls
+    elements = body.elements
+    try:
+        above = surface.elements(elements.degree + 1, elements.element, stack)
+        finer = DeformedBody(above, surface, body.law, body.method, stack)
+        placed = sagged_body(finer, tool, None).placed(tool, finer)
+        again = close_and_pull(finer, placed, depth, closing, len(coarse.steps) - 1)
+    except SolveError as error:
+        raise LargeError(f"no error bar: elements of degree {elements.degree + 1} fail ({error})") from error
+    return coarse.change(again) + fine.change(coarse)
+
+
+def force_across(body: DeformedBody, touched: ContactSolution) -> float:
+    """Return the force (N) across the axis that is left on the modelled part, of support, terms and contacts.
+
+    Collective. Planes of symmetry may bear forces across them.
+    """
+    space = body.elements.displacements
+    local = body.residual().reshape(-1, 3)[space.fixed_owned].sum(axis=0)
+    left = global_sum(space.comm, local) - body.on_terms + touched.forces.sum(axis=0)
+    left[list(body.elements.body.mirrored)] = 0.0
+    return float(np.linalg.norm(left[:2]))
+
+
+def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolution, along: FloatArray) -> PullStep:
+    """Return what each of so many ``contacts`` does."""
+    forces, shares = [], []
+    for number in range(contacts):
+        part = body.part(number)
+        own = part.solution(touched)
+        forces.append(float((own.forces @ along).sum()))
+        shares.append(0.0 if own.slide is None else own.slide.share(part.candidates.weights, own.active))
+    return PullStep(moved, touched, tuple(forces), tuple(shares))
+
+
+def _ended(why: SolveError, last: PullStep, body: DeformedBody, depth: float, length: float) -> LargeError:
+    """Return the error of a pull that goes no farther than the ``last`` step."""
+    whole = 2.0 ** len(body.elements.body.mirrored)
+    pressed = whole * force_of(body.part().solution(last.touched))
+    return LargeError(
+        f"the pull reached {1e3 * last.moved:.3g} mm of {1e3 * length:.3g} mm, where the force along it is "
+        f"{whole * last.force:.4g} N ({why}); use a smaller pull, smaller elements below the jaws, or less friction",
+        (depth, pressed),
+    )
