@@ -15,6 +15,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.plan.estimate import FAR, FLATTEST, IN_LAYER
 from epsmesh.scene.model import Scene
 from epsmesh.shapes.body import Body
+from epsmesh.shapes.closed import Around
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.regions import Embedded
@@ -22,6 +23,8 @@ from epsmesh.shapes.shell import Shell
 
 # Elements on a surface of triangles have sizes in steps of this factor, each with the points of its own part.
 _STEP = 1.3
+# On coarse meshes the points of a part are so many elements apart: gmsh's time is that for the nearest of them.
+_APART = 0.5
 # Sampling points on an embedded region, for the point nearest to anything else.
 _POINTS = 2000
 _MANY = 1000  # cached points
@@ -63,7 +66,7 @@ def region_sizes(scene: Scene, growth: float, largest: float = inf) -> tuple[Loc
         LayerSizes(bottom, top, contact, scene.probe.circumradius + high - bottom, growth, largest)
         for top, bottom in pairwise(heights)
     ]
-    return (*layers, *embedded_sizes(body, growth, contact))
+    return (*layers, *embedded_sizes(body, scene.probe.around(scene.frame, growth)))
 
 
 @dataclass(frozen=True)
@@ -158,15 +161,15 @@ class EmbeddedSizes:
 
 @dataclass(frozen=True, eq=False)
 class OvoidSizes(EmbeddedSizes):
-    """Those of an ellipsoid, for a tool at ``contact``."""
+    """Those of an ellipsoid, ``around`` a tool."""
 
     surface: Ovoid
-    contact: Vector
+    around: Around
 
     @cached_property
     def _size(self) -> float:
         """The size (m) on the surface."""
-        return float(self.surface.sizes(self.contact)[1][0])
+        return float(self.surface.sizes(self.around)[1][0])
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by the factor that scales the surface to them."""
@@ -184,19 +187,23 @@ class OvoidSizes(EmbeddedSizes):
 
 @dataclass(frozen=True, eq=False)
 class ShellSizes(EmbeddedSizes):
-    """Those of a surface of triangles: each part of it has elements by its own thickness, for a tool at ``contact``."""
+    """Those of a surface of triangles: each part of it has elements by its own thickness, ``around`` a tool."""
 
     surface: Shell
-    contact: Vector
+    around: Around
 
     @cached_property
     def _parts(self) -> list[PointSizes]:
         """Parts with elements of one size."""
-        points, sizes, _ = self.surface.sizes(self.contact)
+        points, sizes, areas = self.surface.sizes(self.around)
         least = float(sizes.min())
         step = np.floor(np.log(sizes / least) / np.log(_STEP)).astype(int)
-        parts = {number: points[step == number] for number in np.unique(step).tolist()}
-        return [PointSizes(least * _STEP**number, part, self.growth) for number, part in parts.items()]
+        parts = []
+        for number in np.unique(step).tolist():
+            size = least * _STEP**number
+            every = max(1, int(self.around.coarseness * (_APART * size) ** 2 / areas[0]))
+            parts.append(PointSizes(size, points[step == number][::every], self.growth))
+        return parts
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by their distance to parts of the surface."""
@@ -208,15 +215,15 @@ class ShellSizes(EmbeddedSizes):
             yield from part.terms(unit, kernel)
 
 
-def embedded_sizes(body: Body, growth: float, contact: Vector) -> tuple[EmbeddedSizes, ...]:
-    """Return the element sizes of the embedded regions of a body that a tool touches at ``contact`` (m)."""
+def embedded_sizes(body: Body, around: Around) -> tuple[EmbeddedSizes, ...]:
+    """Return the element sizes of the embedded regions of a body, ``around`` a tool that touches it."""
 
     def sizes(piece: Embedded) -> EmbeddedSizes:
-        nearest, room = _nearest(body, piece)
+        at, growth = _nearest(body, piece), around.of_regions
         if isinstance(surface := piece.surface, Shell):
-            return ShellSizes(nearest, room, growth, surface, contact)
+            return ShellSizes(*at, growth, surface, around)
         assert isinstance(surface, Ovoid)
-        return OvoidSizes(nearest, room, growth, surface, contact)
+        return OvoidSizes(*at, growth, surface, around)
 
     return tuple(map(sizes, body.embedded))
 

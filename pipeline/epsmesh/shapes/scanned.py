@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
+from epsmesh.shapes.closed import Around
 from epsmesh.shapes.facetted import Facetted, skin_of
 from epsmesh.shapes.frame import Frame, Vector
-from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.rays import facing, pierce
 from epsmesh.shapes.surface import Surface
 from epsmesh.shapes.triangles import Triangles, closed_edges, doubled_normals
@@ -27,9 +27,8 @@ _OF_FOOTPRINT, _MOST_CELLS = 0.1, 400
 _MOST_CURVED = 40.0
 # Finest and coarsest deviation of elements' facets from the surface, in units of the largest elements. It goes like the
 # square of the growth of sizes, as the error of chords goes like that of sizes. It is coarsest at the growth for an
-# error bar of 2 %, of a prescribed displacement and of contact that is found.
+# error bar of 2 %.
 FINE, _COARSE = 0.02, 0.1
-_GROWTH_OF_COARSE, _GROWTH_OF_FOUND = 0.6, 0.38
 
 
 class Scanned(Facetted):
@@ -107,15 +106,14 @@ class Scanned(Facetted):
         """Twice the surface integral (m) of the mean curvature; voxel steps count only if elements resolve them."""
         return min(self.triangles.curvature, _MOST_CURVED * self.triangles.area / self.bend)
 
-    def deviation(self, growth: float, probe: Probe, *, straight: bool) -> float:
-        """Return the deviation of elements' facets from the surface far from a ``probe``, for a ``growth`` of sizes.
+    def deviation(self, around: Around, *, straight: bool) -> float:
+        """Return the deviation of elements' facets from the surface far from a tool, for the growth of sizes there.
 
         It is in units of the largest elements. It is small where not all middles of edges come back to the surface: in
         ``straight`` elements, of degree 1, and at junctions of regions.
         """
-        coarse = _GROWTH_OF_COARSE if probe.has_singular_edge else _GROWTH_OF_FOUND
         is_rough = straight or self.partition is not None
-        return FINE if is_rough else min(max(_COARSE * (growth / coarse) ** 2, FINE), _COARSE)
+        return FINE if is_rough else min(max(_COARSE * around.relative**2, FINE), _COARSE)
 
     def outline(self) -> list[FloatArray]:
         """Return silhouettes along x, y and z as lines: edges between facets that face opposite sides."""

@@ -21,8 +21,10 @@ from epsmesh.shapes.shell import Shell
 # enough for sizes that change fast.
 _POINTS, _PASSES = 1000, 2
 # Largest deviation of chords from the surface, in units of half of its smallest thickness: the field rules the sizes.
-_DEVIATION = 0.12
-# Largest change of the volume by chords, which curved edges restore. Beyond, elements are smaller by these factors.
+# On coarse meshes it grows with the square of most sizes, as that of chords does, from so large ones on, up to a limit.
+_DEVIATION, _FROM, _MOST_DEVIATION, _MOST_SIZES = 0.12, 0.8, 0.48, 0.5
+# Largest change of the volume by chords, which curved edges restore; or by the chords of halved edges. Beyond, elements
+# are smaller by these factors.
 _EXCESS, _FINER = 0.1, (1.0, 1.5, 2.0)
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
@@ -42,15 +44,31 @@ def _to_sizes(region: Embedded, field: Field) -> tuple[FloatArray, IntArray]:
     surface = region.surface
     points, facets = _triangles(surface)
     given = Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES)
+    size = float(np.quantile(field.at(points), _MOST_SIZES)) / (_FROM * surface.least)
+    most = _DEVIATION + field.coarseness * (_MOST_DEVIATION - _DEVIATION)
+    deviation = min(_DEVIATION * max(size, 1.0) ** 2, most) * surface.least
     for finer in _FINER:
         sheet = given
         for _ in range(_PASSES):
-            sheet = remesh(sheet, field.at(sheet.points) / finer, _DEVIATION / finer * surface.least)
+            sheet = remesh(sheet, field.at(sheet.points) / finer, deviation / finer)
             sheet = settled(sheet, surface.project(sheet.points))
         edges_of(sheet.facets)
-        if abs(excess := sheet.volume / surface.volume - 1) <= _EXCESS:
-            return sheet.points, sheet.facets
+        for made in (sheet, _halved(sheet, surface)):
+            if abs(excess := made.volume / surface.volume - 1) <= _EXCESS:
+                return sheet.points, sheet.facets
     raise MeshError(f"the volume in the remeshed surface of {region.name} has changed by {excess:+.2%}")
+
+
+def _halved(sheet: Sheet, surface: Closed) -> Sheet:
+    """Return the sheet with its edges halved, on the true surface: nearly that of curved edges."""
+    count = len(sheet.points)
+    keys = np.sort(sheet.facets[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2) @ np.array([count, 1])
+    keys, inverse = np.unique(keys, return_inverse=True)
+    middle = surface.project((sheet.points[keys // count] + sheet.points[keys % count]) / 2)
+    a, b, c = sheet.facets.T
+    u, v, w = (count + inverse).reshape(-1, 3).T
+    facets = np.stack([a, w, v, w, b, u, v, u, c, u, v, w], axis=1).reshape(-1, 3)
+    return Sheet(np.vstack([sheet.points, middle]), facets, np.repeat(sheet.group, 4), sheet.sharp)
 
 
 def _triangles(surface: Closed) -> tuple[FloatArray, IntArray]:

@@ -72,11 +72,12 @@ def find_set(
     energy: float | None = None,
     *,
     roughly: bool = False,
+    is_guess: bool = False,
 ) -> SettledContact:
     """Return the converged active set from the initial guess ``active`` (n); collective.
 
     For ``tolerances`` and ``energy`` see :class:`.elements.LinearTissue`. With ``roughly`` a set from a repeating cycle
-    is accepted.
+    is accepted. For ``is_guess`` see :func:`.deformed.solve_contact`.
 
     Raises:
         SolveError: if the linear solver fails.
@@ -86,7 +87,7 @@ def find_set(
     tool = obstacle.placed(tissue.fixed[:, 0])
     first = tool.complete(active)  # guessed from larger elements, it may reach beside the tool
     try:
-        touched = solve_contact(tissue, tool, first)
+        touched = solve_contact(tissue, tool, first, is_guess=is_guess)
     except NoTouchError as error:
         raise ContactError(str(error)) from error
     except LargeError as error:

@@ -77,11 +77,13 @@ def solve_contact(
     friction_step: FrictionStep | None = None,
     *,
     is_patient: bool = True,
+    is_guess: bool = False,
     limit: float = 0.0,
     scale: float | None = None,
 ) -> ContactSolution:
     """Find equilibrium and contact from the tissue's state and an initial ``active`` set (n); collective.
 
+    The set is corrected by what penetrates the tool in that state, unless it ``is_guess``, for the first step.
     Without ``friction_step`` there is no friction. Without patience, the loop ends where smaller load steps need fewer
     iterations. A residual and gaps below ``limit`` are enough, in units of the forces and the depth; nodes that pull or
     penetrate less may then still change the set. The tool must touch a node, unless the ``scale`` (N) of the contact
@@ -91,7 +93,9 @@ def solve_contact(
         LargeError: if the loop does not converge; a NoTouchError, if the tool touches no node.
         SolveError: if a linear solver fails.
     """
-    loop = _InContact(tissue, tool, active, friction_step, is_patient=is_patient, limit=limit, scale=scale)
+    loop = _InContact(
+        tissue, tool, active, friction_step, is_patient=is_patient, is_guess=is_guess, limit=limit, scale=scale
+    )
     return loop.solve(_MOST_LINEAR if friction_step is not None and friction_step.is_linear else _MOST)
 
 
@@ -118,12 +122,13 @@ class _InContact(Newton[ContactSolution]):
         friction_step: FrictionStep | None,
         *,
         is_patient: bool,
+        is_guess: bool,
         limit: float,
         scale: float | None,
     ):
         self._tissue, self._tool, self._active = tissue, tool, active
         self._friction = None if friction_step is None else FrictionIteration(friction_step)
-        self._is_patient, self._limit, self._scale = is_patient, limit, scale
+        self._is_patient, self._is_guess, self._limit, self._scale = is_patient, is_guess, limit, scale
         self._predicted, self._reactions = np.zeros(tissue.fixed.shape), np.full(len(active), np.inf)
         self._before, self._repeats, self._seen = inf, 0, Counter([active.tobytes()])
         self._refuted = set[bytes]()
@@ -137,7 +142,8 @@ class _InContact(Newton[ContactSolution]):
         tissue, tool, before = self._tissue, self._tool, self._active
         self._place, self._there = _placed(tissue, tool)
         normal, forces = self._there.normal, tissue.forces()
-        following = _next_set(tool, before, self._reactions, self._place.gap)
+        is_first = self._is_guess and iteration == 0
+        following = before if is_first else _next_set(tool, before, self._reactions, self._place.gap)
         along = np.einsum("ni,ni->n", forces, normal)
         if iteration and self._is_refuted(before, following, along):
             self._refuted.add(before.tobytes())

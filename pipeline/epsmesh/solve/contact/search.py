@@ -42,6 +42,9 @@ _LOOSE = 1e-3
 _STRICTER = 0.01
 # Largest λ/μ for the first active set (ν = 0.3), so that elements of degree 1 do not lock.
 _FIRST_RATIO = 1.5
+# The first active set are the nodes that the undeformed surface would have so deep in the tool, in units of the depth:
+# on a half-space those of a ball are 1/2 deep at the edge of contact, those of a cone 0.36.
+_FIRST_DEPTH = 0.5
 
 
 class ContactSearch:
@@ -184,14 +187,16 @@ class ContactSearch:
             lower = ContactElements(plain, self._surface, law, sweep.method, stack)
             obstacle = self._obstacle(lower.candidates, depth, loaded)
             if elements is None or found is None:
-                active = obstacle.bounds < 0
-                if not active.any():
+                reached = obstacle.bounds < 0
+                if not reached.any():
                     raise ContactError("the probe reaches no corner of an element: use smaller elements below it")
+                deep = obstacle.bounds < -_FIRST_DEPTH * depth
+                active = deep if deep.any() else reached
             else:
                 lower.start_from(elements)
                 active = elements.candidates.raised(found.active, lower.candidates)
             energy = None if found is None else found.state.energy
-            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True)
+            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True, is_guess=elements is None)
             lower.show()
             elements, sets = lower, sets + found.touched.iterations
         assert elements is not None
