@@ -4,6 +4,7 @@ import inspect
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from typing import Any
 
 import basix
@@ -81,14 +82,18 @@ def create_mesh(
     """
     dim = comm.bcast(points.shape[1] if comm.rank == 0 else 0)
     domain = ufl.Mesh(_coordinate_element("tetrahedron" if dim == 3 else "triangle", order, dim))
-    names = inspect.signature(dolfinx.mesh.create_mesh).parameters
-    more: dict[str, Any] = {"domain" if "domain" in names else "e": domain}
+    more: dict[str, Any] = {_name_of_domain(): domain}
     if comm.size == 1:  # dolfinx would ask SCOTCH, whose threads take 3 ms to start and end
         beyond = np.empty((len(cells), 0), dtype=np.int32)
     if beyond is not None:
         destinations = _destinations(comm.rank, beyond)
         more["partitioner"] = lambda *_: destinations
     return dolfinx.mesh.create_mesh(comm, cells=cells, x=points, **more)
+
+
+@cache
+def _name_of_domain() -> str:
+    return "domain" if "domain" in inspect.signature(dolfinx.mesh.create_mesh).parameters else "e"
 
 
 def _destinations(rank: int, beyond: np.ndarray) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from epsmesh.mesh.generate import MeshArrays, MeshError
+from epsmesh.mesh.generate import MeshArrays, MeshError, determinants
 from epsmesh.scene.model import FIXED, FREE, JAW, MIRROR, PROBE, Scene
 from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.ovoid import Ovoid
@@ -308,12 +308,6 @@ def _folded(corners: FloatArray, middle: FloatArray) -> BoolArray:
         columns = (gradients.T @ by_node).reshape(3, len(nodes), 3)
         least = np.minimum(least, determinants(columns))
     return np.asarray(least < _LEAST_JACOBIAN * straight)
-
-
-def determinants(columns: FloatArray) -> FloatArray:
-    """Return the triple products (n) of three vectors each, (3, n, 3)."""
-    (a, b, c), (d, e, f), (g, h, i) = (part.T for part in columns)
-    return np.asarray(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
 
 @cache

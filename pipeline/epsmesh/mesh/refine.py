@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.mesh.curve import EDGES, determinants
-from epsmesh.mesh.generate import FLAT, MeshArrays, MeshError
+from epsmesh.mesh.curve import EDGES
+from epsmesh.mesh.generate import FLAT, MeshArrays, MeshError, determinants
 from epsmesh.scene.model import MIRROR, PROBE
 from epsmesh.shapes.triangles import edge_keys, half_edges
 

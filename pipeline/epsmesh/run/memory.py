@@ -4,6 +4,7 @@ import ctypes
 import gc
 import time
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 
 import psutil
@@ -21,6 +22,8 @@ _MOST_MAPPED, _MAPPED_FROM, _TRIMMED_FROM = -4, -3, -1
 _MAPPED_ARRAYS, _LARGE, _FREE = 65_536, 2**27, 2**25
 # Garbage collections take at most one part in so many of the time, if waiting does no harm.
 _RARELY = 50
+# Seconds for which free memory is taken to be the same: the whole of a small case.
+_FRESH = 0.05
 _next: list[float] = [0.0]  # time (s) of the next one
 
 
@@ -79,7 +82,7 @@ class FreeMemory:
 
     def __init__(self, comm: MPI.Comm):
         """Collective."""
-        self._comm = comm
+        self._comm, self._last = comm, (-inf, 0.0)
         machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
         self._is_first = machine.rank == 0
         machine.Free()
@@ -87,8 +90,15 @@ class FreeMemory:
     def available(self) -> float:
         """Return the available bytes, the same on every rank; collective.
 
-        The least of: free memory of the machines, limits of containers, Slurm's grant, limits of the processes.
+        The least of: free memory of the machines, limits of containers, Slurm's grant, limits of the processes. On one
+        rank it is read once in a while.
         """
+        now = time.monotonic()
+        if self._comm.size > 1 or now - self._last[0] > _FRESH:
+            self._last = now, self._read()
+        return self._last[1]
+
+    def _read(self) -> float:
         free = machine_room() if self._is_first else 0.0
         return float(min(self._comm.allreduce(free), self._comm.allreduce(process_room())))
 

@@ -16,7 +16,8 @@ from petsc4py import PETSc
 
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array, IntArray
-from epsmesh.mesh.curve import EDGES, determinants
+from epsmesh.mesh.curve import EDGES
+from epsmesh.mesh.generate import determinants
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.kernels.assembly import StraightStiffness
 from epsmesh.solve.kernels.cells import Ghosts, owned_cells
