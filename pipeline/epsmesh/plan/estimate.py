@@ -24,7 +24,7 @@ _OF_BAR = {
     (True, "mixed"): {3: 1000, 4: 1000},
 }
 # Factor on these without a matrix of degree 1 (benchmarks/results/huge.md).
-_MATRIX_FREE = 0.7
+_MATRIX_FREE = 0.65
 # The same of an error bar for which large contact is found again, in units of that with the area known; and of the
 # stresses, strains and history at the points of large displacements in time steps, for each point of a cell.
 _FOUND_AGAIN, _OF_POINT, _POINTS = 2.3, 1400, {1: 4, 2: 14, 3: 24, 4: 45}
