@@ -68,10 +68,10 @@ PATIENT = {
 _RANGES = {"x": {"from": "-54 mm", "to": "-6 mm"}, "y": {"from": "-12 mm", "to": "20 mm"}}
 BALL = {"shape": "sphere", "radius": "8 mm", "depth": "0.5 mm", "contact": "unilateral"}
 # Tool, mesh, the plan, and the places along each side. F of a ball follows the bumps of the surface, places 3 mm apart
-# differ by 2 to 10 %: each is solved, so that a quarter of the places is enough to know what one takes.
+# differ by 2 to 10 %: each is solved.
 MAPS: dict[str, tuple[Any, ...]] = {
     "disc": (LARGER, ACCURACY, SOME, 20),
-    "ball, contact found": (BALL, {"accuracy": "2 %"}, {}, 10),
+    "ball, contact found": (BALL, {"accuracy": "2 %"}, {}, 20),
 }
 COLUMNS = {"scene": "", "places": "d", "solved": "d", "one place": ".2f", "path": ".2f", "ratio": ".1f", "bar": ".2%"}
 COLUMNS |= {"missed": ".2f"}

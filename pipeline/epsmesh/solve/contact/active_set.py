@@ -87,7 +87,7 @@ def find_set(
     tool = obstacle.placed(tissue.fixed[:, 0])
     first = tool.complete(active)  # guessed from larger elements, it may reach beside the tool
     try:
-        touched = solve_contact(tissue, tool, first, is_guess=is_guess)
+        touched = solve_contact(tissue, tool, first, is_guess=is_guess and bool(first.any()))
     except NoTouchError as error:
         raise ContactError(str(error)) from error
     except LargeError as error:

@@ -171,8 +171,8 @@ class ContactSearch:
         with ExitStack() as stack:
             first, elements, before = self._first_set(sweep, obstacle.depth, loaded, stack)
             sweep.elements.start_from(elements)
-            active = elements.candidates.raised(before.active, self.candidates)
-        return first, find_set(sweep.elements, obstacle, active, tolerances, before.state.energy)
+            active = elements.candidates.raised_by(before.active, self.candidates, obstacle.bounds)
+        return first, find_set(sweep.elements, obstacle, active, tolerances, before.state.energy, is_guess=True)
 
     def _first_set(
         self, sweep: Sweep, depth: float, loaded: FreeResponse | None, stack: ExitStack
@@ -194,9 +194,9 @@ class ContactSearch:
                 active = deep if deep.any() else reached
             else:
                 lower.start_from(elements)
-                active = elements.candidates.raised(found.active, lower.candidates)
+                active = elements.candidates.raised_by(found.active, lower.candidates, obstacle.bounds)
             energy = None if found is None else found.state.energy
-            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True, is_guess=elements is None)
+            found = find_set(lower, obstacle, active, (_LOOSE,), energy, roughly=True, is_guess=True)
             lower.show()
             elements, sets = lower, sets + found.touched.iterations
         assert elements is not None

@@ -226,6 +226,18 @@ class Candidates:
         pairs = self._near(higher)
         return higher._marked(pairs[active[pairs[:, 0]], 1])
 
+    def raised_by(self, active: BoolArray, higher: "Candidates", bounds: FloatArray) -> BoolArray:
+        """Return the same with the area of the ``active`` nodes, for a tool at heights ``bounds`` (m) above the nodes.
+
+        Nodes near both active and inactive nodes belong to it where the tool is deepest.
+        """
+        near, sure = self.raised(active, higher), ~self.raised(~active, higher)
+        edge = np.flatnonzero(near & ~sure)
+        edge = edge[np.argsort(bounds[edge], kind="stable")]
+        area = higher.weights[near & sure].sum() + np.cumsum(higher.weights[edge])
+        near[edge[area > self.weights[active].sum()]] = False
+        return near
+
     def lowered(self, active: BoolArray, lower: "Candidates", *, floats: bool = False) -> BoolArray:
         """Return the nodes of a ``lower`` degree around which most nodes are active.
 
