@@ -5,7 +5,7 @@ form is made at its first use, which is collective.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -47,9 +47,9 @@ class ElasticForms:
 
     ``coefficients`` are the law's parameters by name: constants, or, on a mesh of several ``regions`` (of the local
     cells, ghosts included), functions that are constant on each cell. ``displacement`` is the u of ``action``, K u.
-    With a ``cell_kernel``, that kernel integrates K on straight cells. ``factors`` are those of the energy; ``factor``
-    is what has them in forms, or 1. It ``is_sampled`` at the quadrature points of curved cells, which all cells then
-    are: see :func:`is_sampled`.
+    With a ``cell_kernel``, that kernel integrates K on straight cells. ``factors`` are those of the energy, which then
+    ``is_varied``; ``factor`` is what has them in forms, or 1. It ``is_sampled`` at the quadrature points of curved
+    cells, which all cells then are: see :func:`is_sampled`.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class ElasticForms:
         cell_kernel: CellKernel | None = None,
         factors: Factors | None = None,
     ):
-        self._space, self._regions, self._varies = space, regions, factors is not None
+        self._space, self._regions, self.is_varied = space, regions, factors is not None
         self._cell_kernel = cell_kernel if factors is None else None
         self.factor: Any = 1
         self.is_sampled = is_sampled(space, factors)
@@ -134,7 +134,7 @@ class ElasticForms:
 
         The ``name`` tells integrands of the same parts apart.
         """
-        if self._varies:
+        if self.is_varied:
             return form(self.factor * integrand() * self.dx(curved_only=curved_only), kernels)
         kind, mesh = (name, compat.degree(self._space), curved_only), self._space.mesh
         marks = marked_cells(mesh, curved_only=curved_only)
@@ -263,15 +263,27 @@ class HyperelasticForms:
         """The stored energy, in UFL."""
         return self._derivative()
 
+    def _form(self, name: str, expression: Callable[[], Any]) -> Any:
+        """Return a form of the fields and of the coefficients; the ``name`` tells those of one law apart."""
+        if len(self._cells) > 1 or self._factor is not None or self._elastic.is_varied:
+            return form(expression())
+        # Coefficients have the order in which laws asked for them.
+        kind = name, *self._cells, compat.degree(self._space), *self._coefficients
+        mesh = self._space.mesh
+        spaces = [field.function_space for field in self._fields]
+        parts = *spaces, *self._fields, *self._coefficients.values(), *(self._pressure or ())[1:]
+        return form_like(kind, expression, mesh, marked_cells(mesh), *parts)
+
     @cached_property
     def energy(self) -> Any:
         """Stored energy; NaN where J < 0 anywhere."""
-        return form(self.expression)
+        return self._form("energy", lambda: self.expression)
 
     @cached_property
     def residuals(self) -> tuple[Any, ...]:
         """First derivatives of the energy: nodal forces, and the residual of the pressure."""
-        return tuple(form(self._derivative(self._test(row))) for row in range(len(self._fields)))
+        rows = range(len(self._fields))
+        return tuple(self._form(f"residual {row}", partial(self._derivative, self._test(row))) for row in rows)
 
     @cached_property
     def tangents(self) -> tuple[Any, ...]:
