@@ -129,7 +129,7 @@ def in_model(
                 edges = max(scene.rim_segments // parts, least)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
             gmsh.option.setNumber("Mesh.MeshSizeFactor", sizes.times)
-            local, unit = region_sizes(scene, sizes.growth, sizes.largest), 1 / scene.scale
+            local, unit = region_sizes(scene, sizes.growth, sizes.largest, sizes.coarseness), 1 / scene.scale
             more = [term for part in local for term in part.terms(unit, gmsh.model.geo)]
             more += rounded_sizes(scene, sizes.growth)
             if scene.jaw is not None:

@@ -173,7 +173,15 @@ def sizes_of(case: Case) -> Sizes:
     epsilon = inf if case.is_full else mesh.epsilon
     # Round sides, of the body and of the column, are resolved over their whole length.
     side = min(case.body.bend, inf if mesh.keeps_all else epsilon)
-    return Sizes(epsilon, mesh.fine, mesh.coarse, mesh.rim_size(case.probe.half_width), mesh.growth, side)
+    return Sizes(
+        epsilon,
+        mesh.fine,
+        mesh.coarse,
+        mesh.rim_size(case.probe.half_width),
+        mesh.growth,
+        side,
+        coarseness=mesh.coarseness,
+    )
 
 
 def meridian_of(case: Case) -> Meridian | EllipticMeridian:

@@ -15,7 +15,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.plan.estimate import FAR, FLATTEST, IN_LAYER
 from epsmesh.scene.model import Scene
 from epsmesh.shapes.body import Body
-from epsmesh.shapes.closed import Around
+from epsmesh.shapes.closed import FarSizes
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.regions import Embedded
@@ -53,10 +53,10 @@ class LocalSizes(Protocol):
         """
 
 
-def region_sizes(scene: Scene, growth: float, largest: float = inf) -> tuple[LocalSizes, ...]:
+def region_sizes(scene: Scene, growth: float, largest: float = inf, coarseness: float = 0.0) -> tuple[LocalSizes, ...]:
     """Return the element sizes of the regions of a body, which grow by ``growth`` per unit of distance.
 
-    No element exceeds the ``largest`` size (m) anyway.
+    No element exceeds the ``largest`` size (m) anyway; ``coarseness`` is that of :class:`.FarSizes`.
     """
     body, contact = scene.body, scene.frame.point
     low, high = body.heights
@@ -66,7 +66,7 @@ def region_sizes(scene: Scene, growth: float, largest: float = inf) -> tuple[Loc
         LayerSizes(bottom, top, contact, scene.probe.circumradius + high - bottom, growth, largest)
         for top, bottom in pairwise(heights)
     ]
-    return (*layers, *embedded_sizes(body, scene.probe.around(scene.frame, growth)))
+    return (*layers, *embedded_sizes(body, scene.probe.far_sizes(scene.frame, growth, coarseness)))
 
 
 @dataclass(frozen=True)
@@ -161,15 +161,15 @@ class EmbeddedSizes:
 
 @dataclass(frozen=True, eq=False)
 class OvoidSizes(EmbeddedSizes):
-    """Those of an ellipsoid, ``around`` a tool."""
+    """Those of an ellipsoid, ``far`` from a tool."""
 
     surface: Ovoid
-    around: Around
+    far: FarSizes
 
     @cached_property
     def _size(self) -> float:
         """The size (m) on the surface."""
-        return float(self.surface.sizes(self.around)[1][0])
+        return float(self.surface.sizes(self.far)[1][0])
 
     def on_surface(self, points: FloatArray) -> FloatArray:
         """Return the size (m) at points (n, 3) by the factor that scales the surface to them."""
@@ -187,21 +187,21 @@ class OvoidSizes(EmbeddedSizes):
 
 @dataclass(frozen=True, eq=False)
 class ShellSizes(EmbeddedSizes):
-    """Those of a surface of triangles: each part of it has elements by its own thickness, ``around`` a tool."""
+    """Those of a surface of triangles: each part of it has elements by its own thickness, ``far`` from a tool."""
 
     surface: Shell
-    around: Around
+    far: FarSizes
 
     @cached_property
     def _parts(self) -> list[PointSizes]:
         """Parts with elements of one size."""
-        points, sizes, areas = self.surface.sizes(self.around)
+        points, sizes, areas = self.surface.sizes(self.far)
         least = float(sizes.min())
         step = np.floor(np.log(sizes / least) / np.log(_STEP)).astype(int)
         parts = []
         for number in np.unique(step).tolist():
             size = least * _STEP**number
-            every = max(1, int(self.around.coarseness * (_APART * size) ** 2 / areas[0]))
+            every = max(1, int(self.far.coarseness * (_APART * size) ** 2 / areas[0]))
             parts.append(PointSizes(size, points[step == number][::every], self.growth))
         return parts
 
@@ -215,15 +215,15 @@ class ShellSizes(EmbeddedSizes):
             yield from part.terms(unit, kernel)
 
 
-def embedded_sizes(body: Body, around: Around) -> tuple[EmbeddedSizes, ...]:
-    """Return the element sizes of the embedded regions of a body, ``around`` a tool that touches it."""
+def embedded_sizes(body: Body, far: FarSizes) -> tuple[EmbeddedSizes, ...]:
+    """Return the element sizes of the embedded regions of a body, ``far`` from a tool that touches it."""
 
     def sizes(piece: Embedded) -> EmbeddedSizes:
-        at, growth = _nearest(body, piece), around.of_regions
+        at, growth = _nearest(body, piece), far.of_regions
         if isinstance(surface := piece.surface, Shell):
-            return ShellSizes(*at, growth, surface, around)
+            return ShellSizes(*at, growth, surface, far)
         assert isinstance(surface, Ovoid)
-        return OvoidSizes(*at, growth, surface, around)
+        return OvoidSizes(*at, growth, surface, far)
 
     return tuple(map(sizes, body.embedded))
 

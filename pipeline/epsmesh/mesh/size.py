@@ -29,7 +29,8 @@ class Sizes:
 
     ``growth`` is the increase of size per unit of distance, both from the rim and beyond ``epsilon``. A round side,
     with ``column`` its radius, is resolved over its whole length, also beyond ``epsilon``. All elements, those of
-    regions included, are ``times`` as large. ``jaw_rim`` is the size at the edge of a second jaw.
+    regions included, are ``times`` as large. ``jaw_rim`` is the size at the edge of a second jaw. ``coarseness`` is
+    that of :class:`.FarSizes`.
     """
 
     epsilon: float
@@ -40,6 +41,7 @@ class Sizes:
     column: float = inf
     times: float = 1.0
     jaw_rim: float = inf
+    coarseness: float = 0.0
 
     @property
     def of_jaw(self) -> "Sizes":

@@ -2,7 +2,7 @@
 
 from math import inf, log, pi
 
-from epsmesh.shapes.closed import Around
+from epsmesh.shapes.closed import FarSizes
 from epsmesh.shapes.scanned import FINE, Scanned
 from epsmesh.study.case import Case
 from epsmesh.study.way import PLAIN, Way
@@ -98,7 +98,7 @@ def _of_bend(case: Case) -> float:
     triangles = 6 * body.volume ** (2 / 3) / (_TRIANGLE * far**2)
     follow = _FOLLOW * body.curvature / far
     if isinstance(body, Scanned):
-        follow *= FINE / body.deviation(_around(case), straight=case.mesh.degree == 1)
+        follow *= FINE / body.deviation(_far_sizes(case), straight=case.mesh.degree == 1)
     return body.volume / far**3 + _TETRAHEDRON * (_ON_BOUNDARY * triangles + follow)
 
 
@@ -114,17 +114,17 @@ def _of_regions(case: Case) -> list[float]:
     for low in body.interfaces:
         found.append(_of_layer(case, high, low) + _of_film(case, high, low))
         high = low
-    around = _around(case)
+    far = _far_sizes(case)
     found += [0.0] * (len(body.regions) - len(body.embedded) - len(found))  # the last of layers that fill the body
     for piece in body.embedded:
         # Both sides of its surface: ∫ 1 / (size + growth s)³ ds.
-        _, sizes, areas = piece.surface.sizes(around)
-        found.append(float((areas / (around.of_regions * sizes**2)).sum()))
+        _, sizes, areas = piece.surface.sizes(far)
+        found.append(float((areas / (far.of_regions * sizes**2)).sum()))
     return found
 
 
-def _around(case: Case) -> Around:
-    return case.expected.around(case.frame, case.mesh.growth)
+def _far_sizes(case: Case) -> FarSizes:
+    return case.expected.far_sizes(case.frame, case.mesh.growth, case.mesh.coarseness)
 
 
 def _of_layer(case: Case, high: float, low: float) -> float:

@@ -287,6 +287,7 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
         if not is_full:
             content = {"epsilon": mesh.epsilon, "coarse": mesh.coarse, "outside": mesh.outside}
         content |= {"fine": mesh.fine, "rim": mesh.rim_size(half_width), "growth": mesh.growth}
+        content |= {"coarseness": mesh.coarseness} if mesh.coarseness else {}
         if element:
             content |= {"degree": mesh.degree, "element": element}
     return _text(content)

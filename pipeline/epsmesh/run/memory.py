@@ -42,7 +42,8 @@ def return_large_arrays() -> None:
     """
     with suppress(AttributeError):  # other C libraries than glibc
         _C.mallopt(_MOST_MAPPED, _MAPPED_ARRAYS)
-        _C.mallopt(_MAPPED_FROM, _LARGE)
+        if not _C.mallopt(_MAPPED_FROM, _LARGE):  # glibc before 2.35 takes at most so much
+            _C.mallopt(_MAPPED_FROM, _FREE)
         _C.mallopt(_TRIMMED_FROM, _LARGE)
 
 

@@ -19,24 +19,24 @@ _OF_DISTANCE, _LARGEST = 0.15, 0.8
 # On coarse meshes the largest size is larger by this factor, where the distance is so many radii of the footprint more:
 # a part of the body counts there by the fourth power of the distance.
 _COARSER, _RADII = 2.0, 4.0
-# Growth of sizes for an error bar of 2 %, of a prescribed displacement and of contact that is found. In units of it,
-# meshes with a growth below the first value are fine, above the second coarse.
+# Growth of sizes for an error bar of 2 %, of a prescribed displacement and of contact that is found.
 _GROWTH_OF_COARSE, _GROWTH_OF_FOUND = 0.6, 0.38
-_FINE, _ROUGH = 0.65, 0.9
 # The growth around regions on coarse meshes: no pressure and no edge needs elements there.
 _GROWTH_OF_REGIONS = 0.9
 
 
 @dataclass(frozen=True)
-class Around:
-    """A tool of a ``radius`` that touches a body at ``contact``, both in m, and the ``growth`` of element sizes there.
+class FarSizes:
+    """Element sizes far from a tool of a ``radius`` that touches a body at ``contact``, both in m.
 
-    ``is_singular`` says that the pressure is singular at its edge.
+    ``growth`` is that of sizes around the tool, at whose edge the pressure may be singular (``is_singular``).
+    ``coarseness``, from 0 to 1, says how much larger elements on and around regions may be than on fine meshes.
     """
 
     contact: Vector
     radius: float
     growth: float
+    coarseness: float
     is_singular: bool
 
     @property
@@ -47,12 +47,7 @@ class Around:
     @property
     def of_regions(self) -> float:
         """The growth of sizes around regions."""
-        return self.growth + self.coarseness * (_GROWTH_OF_REGIONS * self.relative - self.growth)
-
-    @property
-    def coarseness(self) -> float:
-        """How much larger elements on far regions may be than on fine meshes, from 0 to 1."""
-        return float(np.clip((self.relative - _FINE) / (_ROUGH - _FINE), 0.0, 1.0))
+        return self.growth + self.coarseness * max(_GROWTH_OF_REGIONS * min(self.relative, 1.0) - self.growth, 0.0)
 
     def size_on(self, half: FloatArray, away: FloatArray) -> FloatArray:
         """Return the size (n) of elements on a surface by ``half`` of its thickness (n), ``away`` (n) from it, in m.
@@ -99,10 +94,10 @@ class Closed(Surface):
         """Return at least ``count`` points of the surface (n, 3), in m, which leave no part of it out."""
 
     @abstractmethod
-    def sizes(self, around: Around) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def sizes(self, far: FarSizes) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return a point (n, 3) of each part of the surface, the size (n) of elements there, and its area (n).
 
-        They are in m and m², ``around`` a tool.
+        They are in m and m², ``far`` from a tool.
         """
 
     @abstractmethod

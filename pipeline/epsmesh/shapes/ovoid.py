@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh.arrays import FloatArray
-from epsmesh.shapes.closed import Around, Closed
+from epsmesh.shapes.closed import Closed, FarSizes
 from epsmesh.shapes.frame import Vector
 
 # Newton's method from the left converges monotonically; points near the centre of flat ellipsoids need most steps.
@@ -52,10 +52,10 @@ class Ovoid(Closed):
         """Its centre and semi-axes."""
         return repr((self.centre, self.axes))
 
-    def sizes(self, around: Around) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def sizes(self, far: FarSizes) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return its centre (m), the size (m) of elements by its smallest semi-axis, and its area (m²)."""
-        away = np.abs(self.distance(np.array([around.contact])))
-        return np.array([self.centre]), around.size_on(np.array([self.least]), away), np.array([self.area])
+        away = np.abs(self.distance(np.array([far.contact])))
+        return np.array([self.centre]), far.size_on(np.array([self.least]), away), np.array([self.area])
 
     def has_axis(self, within: float) -> bool:
         """Return whether it is centred on the z axis, within ``within`` (m), and round about it."""

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.body import Body
-from epsmesh.shapes.closed import Around
+from epsmesh.shapes.closed import FarSizes
 from epsmesh.shapes.crack import Crack
 from epsmesh.shapes.footprint import Footprint
 from epsmesh.shapes.frame import Frame, Vector
@@ -268,9 +268,9 @@ class Probe(Pulled, Footprint):
     def has_singular_edge(self) -> bool:
         """Whether the displacement goes like r^½ at the footprint's edge, which is then the edge of contact."""
 
-    def around(self, frame: Frame, growth: float) -> Around:
-        """Return what element sizes far from the tool depend on, for their ``growth``."""
-        return Around(frame.point, self.circumradius, growth, self.has_singular_edge)
+    def far_sizes(self, frame: Frame, growth: float, coarseness: float) -> FarSizes:
+        """Return the element sizes far from the tool."""
+        return FarSizes(frame.point, self.circumradius, growth, coarseness, self.has_singular_edge)
 
     @property
     @abstractmethod

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.shapes.closed import Around
+from epsmesh.shapes.closed import FarSizes
 from epsmesh.shapes.facetted import Facetted, skin_of
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.rays import facing, pierce
@@ -106,14 +106,14 @@ class Scanned(Facetted):
         """Twice the surface integral (m) of the mean curvature; voxel steps count only if elements resolve them."""
         return min(self.triangles.curvature, _MOST_CURVED * self.triangles.area / self.bend)
 
-    def deviation(self, around: Around, *, straight: bool) -> float:
+    def deviation(self, far: FarSizes, *, straight: bool) -> float:
         """Return the deviation of elements' facets from the surface far from a tool, for the growth of sizes there.
 
         It is in units of the largest elements. It is small where not all middles of edges come back to the surface: in
         ``straight`` elements, of degree 1, and at junctions of regions.
         """
         is_rough = straight or self.partition is not None
-        return FINE if is_rough else min(max(_COARSE * around.relative**2, FINE), _COARSE)
+        return FINE if is_rough else min(max(_COARSE * far.relative**2, FINE), _COARSE)
 
     def outline(self) -> list[FloatArray]:
         """Return silhouettes along x, y and z as lines: edges between facets that face opposite sides."""

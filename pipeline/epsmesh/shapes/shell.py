@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from epsmesh.arrays import FloatArray, IntArray
-from epsmesh.shapes.closed import Around, Closed
+from epsmesh.shapes.closed import Closed, FarSizes
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.skin import Skin
 from epsmesh.shapes.triangles import Triangles, doubled_normals
@@ -157,11 +157,11 @@ class Shell(Closed):
         x, y, z = map(float, points[facets[pairs[0]]].mean(axis=(0, 1)))
         return x, y, z
 
-    def sizes(self, around: Around) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def sizes(self, far: FarSizes) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return points (n, 3), element sizes (n) by the thickness there, and equal areas (n) of parts around them."""
         points, half = self.thin
-        away = np.linalg.norm(points - np.array(around.contact), axis=1)
-        return points, around.size_on(half, away), np.full(len(half), self.triangles.area / len(half))
+        away = np.linalg.norm(points - np.array(far.contact), axis=1)
+        return points, far.size_on(half, away), np.full(len(half), self.triangles.area / len(half))
 
     # ---- symmetry -------------------------------------------------------------------------------------
 

@@ -191,7 +191,7 @@ def _differences(steps: list[tuple[FloatArray, FloatArray]]) -> list[tuple[Float
 def _move(body: BodyMesh, nodes: FloatArray) -> None:
     """Move the nodes of a mesh, of which nothing that was known before is valid then."""
     body.mesh.geometry.x[:] = nodes
-    for known in (measures.CURVED, variation.KNOWN, cell_values.CLEAR_CELLS):
+    for known in (measures.CURVED, measures.MARKED, variation.KNOWN, cell_values.CLEAR_CELLS):
         known.pop(body.mesh, None)
 
 

@@ -5,9 +5,9 @@ One value a key: sweeps are taken apart before a section gets here. Bodies and p
 
 from collections.abc import Mapping
 from math import inf
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, PrivateAttr
 from pydantic_core import PydanticCustomError
 
 from epsmesh import extensions
@@ -191,6 +191,20 @@ class Mesh(Section):
     MIXED_FROM: ClassVar[float] = 0.45
     # What must be given where no accuracy is.
     SIZES: ClassVar[tuple[str, ...]] = ("epsilon", "fine", "coarse")
+
+    # No key: recipes set it.
+    _coarseness: float = PrivateAttr(default=0.0)
+
+    @property
+    def coarseness(self) -> float:
+        """That of :class:`.FarSizes`: how much larger elements on far regions are than on fine meshes, from 0 to 1."""
+        return self._coarseness
+
+    def with_far_regions(self, coarseness: float) -> Self:
+        """Return the mesh with that :attr:`coarseness`."""
+        found = self.model_copy()
+        found._coarseness = coarseness
+        return found
 
     def rim_size(self, half_width: float) -> float:
         """Element size at the edge of a probe of that half width (m)."""

@@ -45,7 +45,7 @@ def _to_sizes(region: Embedded, field: Field) -> tuple[FloatArray, IntArray]:
     points, facets = _triangles(surface)
     given = Sheet(points, facets, np.full(len(facets), FREE), _NO_EDGES)
     size = float(np.quantile(field.at(points), _MOST_SIZES)) / (_FROM * surface.least)
-    most = _DEVIATION + field.coarseness * (_MOST_DEVIATION - _DEVIATION)
+    most = _DEVIATION + field.sizes.coarseness * (_MOST_DEVIATION - _DEVIATION)
     deviation = min(_DEVIATION * max(size, 1.0) ** 2, most) * surface.least
     for finer in _FINER:
         sheet = given
@@ -53,7 +53,7 @@ def _to_sizes(region: Embedded, field: Field) -> tuple[FloatArray, IntArray]:
             sheet = remesh(sheet, field.at(sheet.points) / finer, deviation / finer)
             sheet = settled(sheet, surface.project(sheet.points))
         edges_of(sheet.facets)
-        for made in (sheet, _halved(sheet, surface)):
+        for made in (sheet, *([_halved(sheet, surface)] if field.sizes.coarseness else [])):
             if abs(excess := made.volume / surface.volume - 1) <= _EXCESS:
                 return sheet.points, sheet.facets
     raise MeshError(f"the volume in the remeshed surface of {region.name} has changed by {excess:+.2%}")

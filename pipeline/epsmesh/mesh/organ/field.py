@@ -18,14 +18,12 @@ class Field:
     """``sizes`` around a ``frame``, and those of the body's regions.
 
     ``edge`` (n, 3), in m, are dense points along the edge of contact, where it is expected to end if it is found.
-    ``coarseness`` is that of :class:`.Around`.
     """
 
     sizes: Sizes
     frame: Frame
     edge: FloatArray
     local: tuple[LocalSizes, ...] = ()
-    coarseness: float = 0.0
 
     @cached_property
     def _tree(self) -> cKDTree:

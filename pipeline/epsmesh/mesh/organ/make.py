@@ -59,7 +59,7 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
 
     tangles: list[TangledError] = []
     contact: Near | None = None
-    around = scene.probe.around(scene.frame, sizes.growth)
+    around = scene.probe.far_sizes(scene.frame, sizes.growth, sizes.coarseness)
     deviation = body.deviation(around, straight=scene.straight)
     for finer in _FINER:
         smaller = replace(sizes, column=sizes.column / finer)
@@ -100,8 +100,8 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
         return scene.body.lift(scene.frame, points)[0]
 
     contact = set_in(far.sheet, far.faces, scene.frame, scene.footprint, sizes, lift)
-    around = scene.probe.around(scene.frame, sizes.growth)
-    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, around), around.coarseness)
+    around = scene.probe.far_sizes(scene.frame, sizes.growth, sizes.coarseness)
+    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, around))
     sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
     sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
     _check_whole(sheet, far, scene.body)

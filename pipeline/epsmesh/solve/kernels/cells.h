@@ -78,9 +78,8 @@ static inline __attribute__((always_inline, unused)) void gather_floats(
 
 static inline __attribute__((always_inline)) void add_three_floats(float* y, __m128 more)
 {
-  const __m128 pair = _mm_castpd_ps(_mm_load_sd((const double*)y));
-  const __m128 sum = _mm_add_ps(pair, more);
-  _mm_store_sd((double*)y, _mm_castps_pd(sum));
+  const __m128 pair = _mm_loadl_pi(_mm_setzero_ps(), (const __m64*)y);
+  _mm_storel_pi((__m64*)y, _mm_add_ps(pair, more));
   y[2] += _mm_cvtss_f32(_mm_movehl_ps(more, more));
 }
 

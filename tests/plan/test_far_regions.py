@@ -1,0 +1,36 @@
+"""Elements on regions far from a tool: larger on coarse meshes that the program chooses, and on no others."""
+
+from dataclasses import replace
+
+import pytest
+
+from epsmesh.plan.key import mesh_key
+from epsmesh.plan.recipe import rungs_for
+from tests.cases import NO_SIZES, study
+
+LUMP = {"name": "lump", "at": ["0 mm", "0 mm", "-12 mm"], "radius": "4 mm", "young": "50 kPa", "poisson": 0.3}
+CHOSEN = NO_SIZES | {"accuracy": "2 %"}
+
+
+def case(**changes):
+    return next(study(**{"body": {"inclusion": [LUMP]}, "mesh": CHOSEN} | changes).cases())
+
+
+def test_only_coarse_meshes_of_degree_2_have_larger_elements_there():
+    rungs = rungs_for(case(), 0.02)
+    assert rungs[0].mesh.coarseness > 0
+    for rung in rungs:
+        assert not rung.mesh.coarseness or (rung.mesh.degree == 2 and rung.bar > 5e-3), rung
+    assert not any(rung.mesh.coarseness for rung in rungs_for(case(), 0.004))
+
+
+@pytest.mark.parametrize("changes", [{"body": {"inclusion": None}}, {"mesh": CHOSEN | {"degree": 3}}])
+def test_without_regions_and_in_other_degrees_none_are(changes):
+    assert not any(rung.mesh.coarseness for rung in rungs_for(case(**changes), 0.02))
+
+
+def test_given_sizes_stay_as_they_are_and_keys_tell_the_meshes_apart():
+    given = case(mesh={})
+    assert given.mesh.coarseness == 0
+    coarser = replace(given, mesh=given.mesh.with_far_regions(1.0))
+    assert mesh_key(coarser) != mesh_key(given)
