@@ -1,6 +1,7 @@
 """Two jaws that are pulled once they have closed: stiffness, slip, Coulomb's limit, work, balance and symmetry."""
 
-from math import pi
+from dataclasses import replace
+from math import isnan, pi
 from typing import Any
 
 import pytest
@@ -9,6 +10,10 @@ from mpi4py import MPI
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
+from epsmesh.run.given_force import with_depths
+from epsmesh.run.record import Record
+from epsmesh.solve.contact_result import ContactResult, PullResult, Slip
+from epsmesh.states import PARTIAL
 from epsmesh.study.read import parse
 from tests.cases import raw, refusal, solve
 from tests.solve.test_grasp import BALL, DISC, LARGE, NEAR, closed, grasp
@@ -56,6 +61,42 @@ def test_after_whole_slip_the_force_is_coulombs(linear):
     total = linear["pull_force"] + linear["jaw_pull_force"]
     assert linear["slip_whole_force"] == pytest.approx(total, abs=linear["slip_whole_force_error"])
     assert 0 < linear["slip_begins"] < linear["slip_whole"] < 0.2e-3
+
+
+def test_bars_of_the_pull_are_at_least_those_of_the_normal_force(linear):
+    least = linear["closed_force_error"] / linear["closed_force"]  # F has the same, and its friction is all of the pull
+    assert linear["pull_force_error"] >= least * linear["pull_force"] * (1 - 1e-12)
+    least = linear["jaw_force_error"] / linear["jaw_force"]
+    assert linear["jaw_pull_force_error"] >= least * linear["jaw_pull_force"] * (1 - 1e-12)
+    assert linear["slip_begins_error"] >= linear["slip_begins"]
+    assert linear["slip_begins_force_error"] >= linear["slip_begins_force"]
+
+
+def test_bars_of_the_pull_cover_that_of_a_finer_mesh(linear):
+    coarse = pulled(SLIPS, mesh={"rim": "1.6 mm"})
+    for name in ("pull_force", "jaw_pull_force", "slip_whole", "slip_whole_force"):
+        assert coarse[name] == pytest.approx(linear[name], rel=0, abs=coarse[f"{name}_error"]), name
+
+
+def test_least_bars_widen_those_of_the_pull_once():
+    slip = Slip(1e-3, 1e-4, 2.0, 0.1)
+    pull = PullResult((1.0, 1.0), slip, None, 0.0, 0.0, 0.0, 3.0).with_bar(0.1)
+    contact = ContactResult(1e-6, bar=0.1, pull=pull)
+    assert contact.with_least_bar(0.05).pull == pull
+    wider = contact.with_least_bar(0.3).pull
+    assert wider is not None
+    assert wider.begins is not None
+    assert wider.bar == 0.3
+    assert wider.begins.at_bar == pytest.approx(1e-4 + 0.3 * 1e-3)
+    assert wider.begins.force_bar == pytest.approx(0.1 + 0.3 * 2.0)
+
+
+def test_slip_that_another_pull_does_not_reach_has_no_known_bar():
+    slip = Slip(1e-3, 1e-4, 2.0, 0.1)
+    assert isnan(slip.with_change(slip, None).at_bar)
+    changed = slip.with_change(slip, replace(slip, at=1.2e-3, force=1.5))
+    assert changed.at_bar == pytest.approx(3e-4)
+    assert changed.force_bar == pytest.approx(0.6)
 
 
 def test_balls_slip_as_mindlin_computed(linear):
@@ -122,11 +163,29 @@ def test_jaws_close_to_a_force_and_are_then_pulled(linear):
     assert float(found["pull_force"]) == pytest.approx(linear["pull_force"], rel=2e-2)
 
 
+@pytest.mark.parametrize("has_closed", [False, True], ids=["closing ended", "the pull ended"])
+def test_only_jaws_that_have_closed_have_a_trial_force(has_closed):
+    plan = make_plan(parse(grasp(NEAR | {"force": "6 mN", "friction": MU, "pull": "0.2 mm"}, body=SIDES)))
+    plan = with_depths(plan, {})
+    (key,), case = plan.keys, plan.study.case(())
+    scale, depth = plan.scale_of(case), case.probe.depth
+    reached = depth if has_closed else depth / 2
+    ended = Record(key, PARTIAL, young=scale.stress, depth=scale.length, depth_reached=reached, force_reached=3e-3)
+    after = with_depths(plan, {key: ended})
+    if has_closed:
+        assert after.study.case(()).probe.depth > depth
+    else:
+        assert "load steps end there" in after.depths_at_force[()].message
+        assert after.depths_at_force[()].depth == reached
+
+
 def test_a_pull_that_leaves_its_contact_is_partial():
     found = closed(BALL | {"friction": MU, "pull": "5 mm"}, body=SIDES, material=LARGE)
     assert found.status == "partial"
     assert "the pull reached" in found.message
-    assert found.force_reached > 0
+    before = closed(BALL | {"friction": MU}, body=SIDES, material=LARGE)
+    assert found.depth_reached == pytest.approx(0.3e-3)
+    assert found.force_reached == pytest.approx(before.force, rel=1e-3)
 
 
 @pytest.mark.parametrize(

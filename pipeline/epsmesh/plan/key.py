@@ -78,7 +78,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
     tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
-    tail += [f"pull {case.probe.pulled}"] if case.probe.pulled else []
+    tail += [f"pulled {case.probe.pulled}"] if case.probe.pulled else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), last, case.probe.half_width

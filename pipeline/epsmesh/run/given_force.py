@@ -5,7 +5,7 @@ Each trial is an ordinary case with its depth: reductions, meshes, error bars an
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import isclose, isfinite, nan
 from typing import Any
 
 from epsmesh.plan.given_force import DepthAtForce, Trial, next_depth
@@ -133,9 +133,10 @@ def _made(plan: Plan, depths: Mapping[tuple[int, ...], float], *, is_last: bool 
 def _trial(plan: Plan, case: Case, record: Record) -> Trial:
     """Return what is known of a case at a trial depth; where load steps ended, at the depth that they reached."""
     here = record.scaled(plan.scale_of(case))
-    if here.status == PARTIAL and case.probe.pull is None:
+    has_closed = case.probe.pull is not None and isclose(here.depth_reached, case.probe.depth)
+    if here.status == PARTIAL and not has_closed:
         return Trial(here.depth_reached, here.force_reached, message=_ENDED, is_end=True)
-    if here.status == PARTIAL:  # the jaws closed, and the pull ended
+    if here.status == PARTIAL:  # the pull ended; its force is that of the closed jaws
         return Trial(case.probe.depth, here.force_reached)
     if here.status in (OK, FAILED) and isfinite(here.force):
         # Jaws that are pulled have closed to the force before.

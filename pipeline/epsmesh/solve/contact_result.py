@@ -62,7 +62,8 @@ class ContactResult:
     def with_least_bar(self, share: float) -> "ContactResult":
         """Return the contact with a relative bar on its area of at least ``share``, where it has one."""
         rest = None if self.rest is None else self.rest.with_least_bar(share)
-        return replace(self, bar=max(self.bar, share), rest=rest)  # max(nan, share) is NaN
+        pull = None if self.pull is None else self.pull.with_least_bar(share)
+        return replace(self, bar=max(self.bar, share), rest=rest, pull=pull)  # max(nan, share) is NaN
 
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.
@@ -116,6 +117,17 @@ class Slip:
         more = relative * abs(self.force)
         return replace(self, at_bar=self.at_bar + relative * self.at, force_bar=self.force_bar + more)
 
+    def with_change(self, one: "Slip | None", other: "Slip | None") -> "Slip":
+        """Return it with bars that cover the change from ``one`` slip to an ``other``, too: NaN if one is missing."""
+        if one is None or other is None:
+            return replace(self, at_bar=nan, force_bar=nan)
+        more = abs(other.force - one.force)
+        return replace(self, at_bar=self.at_bar + abs(other.at - one.at), force_bar=self.force_bar + more)
+
+    def from_zero(self) -> "Slip":
+        """Return it with bars that reach down to zero."""
+        return replace(self, at_bar=max(self.at_bar, self.at), force_bar=max(self.force_bar, abs(self.force)))
+
 
 @dataclass(frozen=True)
 class PullResult:
@@ -140,6 +152,18 @@ class PullResult:
         """Return it with a ``relative`` bar on forces."""
         begins, whole = (slip and slip.with_bar(relative) for slip in (self.begins, self.whole))
         return replace(self, begins=begins, whole=whole, bar=relative)
+
+    def with_least_bar(self, share: float) -> "PullResult":
+        """Return it with a relative bar on forces of at least ``share``, where it has one."""
+        if not share > self.bar:
+            return self
+        begins, whole = (slip and slip.with_bar(share - self.bar) for slip in (self.begins, self.whole))
+        return replace(self, begins=begins, whole=whole, bar=share)
+
+    def with_change(self, one: "PullResult", other: "PullResult") -> "PullResult":
+        """Return it with bars on slip that cover the change from ``one`` pull to an ``other``, too."""
+        begins = self.begins and self.begins.with_change(one.begins, other.begins)
+        return replace(self, begins=begins, whole=self.whole and self.whole.with_change(one.whole, other.whole))
 
 
 @dataclass(frozen=True)

@@ -311,8 +311,8 @@ def _with_bars(contact: ContactResult, finer: HierarchicalEstimate) -> ContactRe
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
     if contact.rest is not None:
         found = replace(found, rest=replace(contact.rest, bar=finer.rest_bar, force_bar=finer.rest_force_bar))
-    if contact.pull is not None:
-        found = replace(found, pull=contact.pull.with_bar(finer.pull_bar))
+    if finer.pull is not None:
+        found = replace(found, pull=finer.pull)
     if contact.rubbing is None or finer.relative is None:
         return found
     of_slip, of_force = contact.rubbing.bars(contact.area, float(finer.relative[0]), finer.area_bar)

@@ -59,8 +59,8 @@ class Friction:
 
     Where nodes above a bed are among all, both are given for each node: (n), and (n, d), zero on a support.
     ``penalty`` (n), N/m: see :mod:`.coulomb`. ``deepest`` (m) is the depth at the end of the path. ``is_linear``: the
-    tissue is, and the initial guess of a step is its solution for the contact before. ``is_closed``: it is at that
-    depth, and the amounts of the path are those of another way.
+    tissue is, and the initial guess of a step is its solution for the contact before. ``is_at_depth``: it is
+    at that depth, and the amounts of the path are those of another way.
     """
 
     coefficient: float | FloatArray
@@ -69,7 +69,7 @@ class Friction:
     neighbours: Neighbours
     deepest: float
     is_linear: bool = False
-    is_closed: bool = False
+    is_at_depth: bool = False
 
     @classmethod
     def on(cls, body: DeformedBody, tool: Tool, depth: float) -> "Friction":
@@ -238,7 +238,7 @@ def friction_step(
         slide or Slide.none(before.shape),
         normal,
         tissue.fixed,
-        most_simplified(friction.deepest if friction.is_closed else depth, friction.deepest),
+        most_simplified(friction.deepest if friction.is_at_depth else depth, friction.deepest),
         friction.is_linear,
     )
 

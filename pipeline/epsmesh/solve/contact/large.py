@@ -39,7 +39,7 @@ from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import check_edges, placed_tool
 from epsmesh.solve.contact.pull import STEPS as PULL_STEPS
-from epsmesh.solve.contact.pull import Pull, bar_of_pull, force_across, pull_jaws
+from epsmesh.solve.contact.pull import Pull, force_across, pull_jaws, with_bars
 from epsmesh.solve.contact.rest import Rest, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
@@ -278,7 +278,10 @@ class LargeContactSolution:
             if not self.beside.pulls:
                 return found
             above = (self.body, self.surface, self.beside.smooth.tool, self.depth, LargeContact.STEPS // 2)
-            return replace(found, pull_bar=bar_of_pull(self.beside.pulls, *above, stack))
+            assert found.relative is not None
+            at_edge = max([self.surface_contact.area.bar, *(rest.area.bar for rest in self.rests)])
+            bars = (float(found.relative[0]), found.rest_force_bar), at_edge
+            return replace(found, pull=with_bars(self.beside.pulls, *above, bars, stack))
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])

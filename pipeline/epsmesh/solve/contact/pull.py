@@ -4,12 +4,13 @@ The pull is a load path of its own, from the equilibrium of the closed jaws on. 
 With a linear law the gaps stay those above the undeformed places: the pull is small beside the contact.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import global_sum
@@ -28,6 +29,7 @@ from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 from epsmesh.solve.contact_result import PullResult, Slip
+from epsmesh.solve.estimate import found_again_bar
 from epsmesh.solve.newton import LargeError
 
 # Steps of a pull, of equal lengths.
@@ -77,10 +79,9 @@ class Pull:
         """The last step."""
         return self.steps[-1]
 
-    def change(self, other: "Pull") -> float:
-        """Return the largest relative change of a jaw's force at the end to that of an ``other`` pull."""
-        pairs = zip(self.end.forces, other.end.forces, strict=True)
-        return max(abs(again / own - 1) for own, again in pairs)
+    def changes(self, other: "Pull") -> tuple[float, ...]:
+        """Return the relative change of each jaw's force at the end to that of an ``other`` pull."""
+        return tuple(again / own - 1 for own, again in zip(self.end.forces, other.end.forces, strict=True))
 
     def result(self, images: float) -> PullResult:
         """Return that of the whole body, of which the modelled part has so many ``images``."""
@@ -119,7 +120,7 @@ def pull_jaws(
     def tool_at(moved: float) -> PlacedTool:
         return placed_tool(body, moved_tool(moved), depth)
 
-    rubs = replace(friction, advance=np.tile(along, (len(body.fixed), 1)), is_closed=True)
+    rubs = replace(friction, advance=np.tile(along, (len(body.fixed), 1)), is_at_depth=True)
     path, energy, work, heat = ContactPath(ContactPathPoint(0.0, body.state, touched)), body.energy, 0.0, 0.0
     found, places = [_step(body, count, 0.0, touched, along)], body.positions()
     for number in range(1, steps + 1):
@@ -130,7 +131,7 @@ def pull_jaws(
             assert now is not None
             check_edges(body, moved_tool(moved), now)
         except SolveError as error:
-            raise _ended(error, found[-1], body, depth, length) from error
+            raise _ended(error, found, body, depth, length) from error
         before, after, here = found[-1], _step(body, count, moved, now, along), body.positions()
         work += (after.moved - before.moved) * (before.force + after.force) / 2
         slips = here - places - (after.moved - before.moved) * along
@@ -164,19 +165,22 @@ def close_and_pull(body: DeformedBody, tool: Tool, depth: float, closing: int, p
     return pull_jaws(body, tool, depth, path.last.touched, friction, pulling)
 
 
-def bar_of_pull(
+def with_bars(
     pulls: tuple[Pull, ...],
     body: DeformedBody,
     surface: Surface,
     tool: Tool,
     depth: float,
     closing: int,
+    bars: tuple[Sequence[float], float],
     stack: ExitStack,
-) -> float:
-    """Return the relative 95 % bar on forces along ``pulls`` in half the steps, and in all of them; collective.
+) -> PullResult:
+    """Return the last of the ``pulls`` in half the steps, and in all of them, with its 95 % bars; collective.
 
-    It is the change by half the steps, and the change of these in elements of one degree more, in which jaws close in
-    so many steps, ``closing``. The ``stack`` frees what is made.
+    They are from the change by half the steps, and the change of these in elements of one degree more, in which jaws
+    close in so many steps, ``closing``. Of the relative ``bars`` the first are those on the normal forces: after whole
+    slip, forces along the pull are in proportion to them. The last is that on the areas by the size of elements. The
+    ``stack`` frees what is made.
 
     Raises:
         LargeError: if the next degree fails.
@@ -190,7 +194,14 @@ def bar_of_pull(
         again = close_and_pull(finer, placed, depth, closing, len(coarse.steps) - 1)
     except SolveError as error:
         raise LargeError(f"no error bar: elements of degree {elements.degree + 1} fail ({error})") from error
-    return coarse.change(again) + fine.change(coarse)
+    (pressed, at_edge), least = bars, fitted.AT_EDGE_LARGE[elements.degree]
+    of_degree = [found_again_bar(share, at_edge, least)[1] for share in coarse.changes(again)]
+    of_steps = map(abs, fine.changes(coarse))
+    bar = max(*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True)))
+    half, whole, finest = (pull.result(2.0 ** len(elements.body.mirrored)) for pull in (coarse, fine, again))
+    found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
+    # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
+    return replace(found, begins=found.begins and found.begins.from_zero())
 
 
 def force_across(body: DeformedBody, touched: ContactSolution) -> float:
@@ -216,10 +227,10 @@ def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolut
     return PullStep(moved, touched, tuple(forces), tuple(shares))
 
 
-def _ended(why: SolveError, last: PullStep, body: DeformedBody, depth: float, length: float) -> LargeError:
-    """Return the error of a pull that goes no farther than the ``last`` step."""
-    whole = 2.0 ** len(body.elements.body.mirrored)
-    pressed = whole * force_of(body.part().solution(last.touched))
+def _ended(why: SolveError, steps: list[PullStep], body: DeformedBody, depth: float, length: float) -> LargeError:
+    """Return the error of a pull that goes no farther than the last of its ``steps``, with the force before."""
+    whole, last = 2.0 ** len(body.elements.body.mirrored), steps[-1]
+    pressed = whole * force_of(body.part().solution(steps[0].touched))
     return LargeError(
         f"the pull reached {1e3 * last.moved:.3g} mm of {1e3 * length:.3g} mm, where the force along it is "
         f"{whole * last.force:.4g} N ({why}); use a smaller pull, smaller elements below the jaws, or less friction",

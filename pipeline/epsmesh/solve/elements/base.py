@@ -15,7 +15,7 @@ from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.coarse_levels import CoarseSpace
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import Front
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import ContactResult, PullResult
 from epsmesh.solve.crack import Release
 from epsmesh.solve.elements.fields import Column, ElementFields, Fields
 from epsmesh.solve.elements.tangent import Tangent
@@ -56,7 +56,7 @@ class HierarchicalEstimate:
     ``at_edge`` what the size of the elements at its edge has of it.
     ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
     ``rest_force_bar`` that on the force of such a jaw.
-    ``pull_bar`` is the relative one on forces along a pull.
+    ``pull`` is what jaws do that are pulled, with its bars.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
@@ -71,7 +71,7 @@ class HierarchicalEstimate:
     rest_bar: float = nan
     rest_force_bar: float = nan
     friction_bar: float = 0.0
-    pull_bar: float = nan
+    pull: PullResult | None = None
     is_solved: bool = False
 
 
