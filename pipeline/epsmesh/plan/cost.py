@@ -182,8 +182,8 @@ def _memory(solve: Solve) -> float:
 def kind_of(solve: Solve) -> str:
     """Return the kind of a solve in the cost model.
 
-    It names element, degree, several movements, unilateral contact, friction, several materials, a shape without load,
-    a refined mesh, the number of time steps, and a curved or folded body.
+    It names element, degree, several movements, unilateral contact, friction, a second jaw and its pull, several
+    materials, a shape without load, a refined mesh, the number of time steps, and a curved or folded body.
     """
     case, way = solve.case, solve.way
     if solve.axisymmetric:
@@ -191,6 +191,8 @@ def kind_of(solve: Solve) -> str:
     words = [way.formulation, str(case.mesh.degree)]
     words += [str(case.movements)] if case.movements > 1 else []
     words += _TOUCH.get(way.constraint, [])
+    words += ["grasp"] if case.jaw else []
+    words += ["pull"] if case.probe.pull else []
     words += ["regions"] if case.body.regions else []
     words += ["unloaded"] if case.imaged else []
     words += ["refined"] if refinement.is_refined(case) else []
