@@ -7,7 +7,7 @@ from math import inf, isnan, nan
 import pytest
 from mpi4py import MPI
 
-from benchmarks import stress
+from benchmarks import scenes, stress
 from benchmarks.stress import Result, judge, run, summary, table, to_json
 from benchmarks.stress_cells import Cell, cells
 from epsmesh.run.record import UNFORESEEN, Record
@@ -29,7 +29,7 @@ def test_quick_cells_pass():
 
 @pytest.mark.mpi
 def test_a_wrong_force_with_a_good_status_fails(monkeypatch):
-    right = stress.compute
+    right = scenes.compute
 
     def wrong(plan, comm):
         """Return forces that are 10 % off, but for those of the references."""
@@ -37,7 +37,7 @@ def test_a_wrong_force_with_a_good_status_fails(monkeypatch):
         factor = 1.0 if all(solve.goal for solve in plan.solves) else 1.1
         return {key: replace(record, force=factor * record.force) for key, record in found.items()}
 
-    monkeypatch.setattr(stress, "compute", wrong)
+    monkeypatch.setattr(scenes, "compute", wrong)
     results = [result for result in run(WORLD, ["Poisson's ratio"], quick=True) if result.value == "0.44"]
     (result,) = results
     assert result.status == "FAIL"
