@@ -34,7 +34,7 @@ UNCONCERNED = $(if $(findstring tests/,$(PYTEST_ARGS)),,$$($(PYTHON) -m tests.su
 # Tests and documentation start hundreds of processes: each would compile the package again.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Huge pages for large arrays: a tenth of a run's time (docs/why/performance.md).
+# Huge pages for large arrays.
 export GLIBC_TUNABLES ?= glibc.malloc.hugetlb=1
 
 DOCS := docs/_build/html

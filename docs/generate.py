@@ -1,51 +1,19 @@
 """The reference pages, written from the code when the documentation is built: study keys, dataset, commands."""
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from epsmesh.cli import app
-from epsmesh.plan.plan import make_plan
-from epsmesh.quantities import RUN, attributes
-from epsmesh.report.dataset import build
+from epsmesh.quantities import RESERVED, RUN, attributes
 from epsmesh.study.capabilities.features import FEATURES
 from epsmesh.study.capabilities.obstacles import OBSTACLES
 from epsmesh.study.capabilities.refusals import REFUSALS
 from epsmesh.study.json_schema import schema_text
 from epsmesh.study.keys import all_sections, heading, keys_of, text_of
-from epsmesh.study.read import parse
-from epsmesh.study.starter import starter
 from epsmesh_identify.estimation.dataset import WORDS
-
-# Studies that together have every variable: changes of the one that `epsmesh new` writes.
-_VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
-    {
-        "probe": {"motion": "all"},
-        "mesh": {"outside": "coarse"},
-        "load": {"traction": [{"on": "sides", "pressure": "1 kPa"}]},
-    },
-    {"probe": {"contact": "unilateral"}},
-    {
-        "probe": {
-            "shape": "blade",
-            "length": "8 mm",
-            "width": "1 mm",
-            "depth": "0.2 mm",
-            "incision": "4 mm",
-        },
-        "mesh": {"outside": "coarse"},
-    },
-    {"material": {"poisson": 0.3, "law": ["linear", "neo-hookean"]}, "solve": {"exact": False}},
-    {
-        "material": {"spread": {"young": "30 %", "correlation_length": "5 mm"}},
-        "mesh": {"outside": "coarse"},
-        "solve": {"exact": False},
-    },
-)
-
 
 # Tables that campaigns wrote; the site has copies.
 _TABLES = sorted((Path(__file__).parents[1] / "benchmarks" / "results").glob("*.md"))
@@ -128,13 +96,7 @@ def features_page() -> str:
 
 def dataset_page() -> str:
     """Return the page of every variable of a dataset."""
-    of_files = ("surface_deviation", "body_message", "force_uncertainty", "force_image_uncertainty")
-    found: dict[str, dict[str, Any]] = {name: attributes(name) for name in of_files}
-    for changes in _VARIANTS:
-        study = tomllib.loads(starter("study"))
-        for section, keys in changes.items():
-            study[section] = keys if "shape" in keys else study.get(section, {}) | keys
-        found |= {name: variable.attrs for name, variable in build(make_plan(parse(study)), {}).data_vars.items()}
+    found = {name: attributes(name) for name in RESERVED}
     lines = [
         "# Dataset",
         "",
@@ -155,8 +117,8 @@ def dataset_page() -> str:
         "Error bars are absolute, in the unit of their value. The value names its bar in `ancillary_variables`. "
         '`dataset.epsmesh.relative("force_error")` returns one as a share.',
         "",
-        'Variables of loads, slits, unilateral contact, `motion = "all"`, several laws, a surface of triangles or a '
-        "repaired file exist only where the study has these.",
+        'Variables of loads, slits, unilateral contact, a support that lets go, two jaws, a history, `motion = "all"`, '
+        "several laws, a surface of triangles or a repaired file exist only where the study has these.",
     ]
     groups = {"Results": sorted(found.keys() - {*RUN}), "Group `run`": [name for name in RUN if name in found]}
     for title, names in groups.items():

@@ -41,7 +41,8 @@ class Body(Section, ABC):
         Fixed,
         Words(
             "Support of the body: its bottom, its sides, both, or all tissue below a height. "
-            'Displacements are zero there. "none": a term of [load] holds the body, or [body.support].',
+            'Displacements are zero there. "none": [body.support], two jaws, or a term of your own in [load] hold the '
+            "body.",
             '"bottom"',
             takes='"bottom" | "sides" | "bottom+sides" | {below = length} | "none"',
         ),

@@ -57,8 +57,8 @@ class Probe(Pulled, Footprint):
     depth: Annotated[
         Length,
         Words(
-            "Depth of the tool below the first touch, along its axis. F is proportional to it, except "
-            "for unilateral contact and in a slit.",
+            "Depth of the tool below the first touch, along its axis. F is proportional to it with "
+            "linear laws and prescribed footprints, but not in a slit or with a capsule.",
             '"0.2 mm"',
             is_used=True,
         ),

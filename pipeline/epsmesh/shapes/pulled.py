@@ -17,7 +17,8 @@ class Pulled(Section):
         Length | None,
         Field(exclude=True),
         Words(
-            "Way by which both jaws of a grasp, once closed, move along the surface together. Needs friction.",
+            "Distance by which both jaws of a grasp, once closed, move along their faces together. It needs friction, "
+            "and a body that is fixed.",
             '"0.5 mm"',
             default="none: the jaws only close",
         ),

@@ -188,7 +188,7 @@ def _fixed(value: Any) -> Any:
     if value not in get_args(FaceNames):
         raise PydanticCustomError(
             "not_supported",
-            "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}; 'none' if a term of [load] holds it",
+            "must be 'bottom', 'sides', 'bottom+sides' or {below = \"-15 mm\"}; 'none' with [body.support] or two jaws",
         )
     return value
 

@@ -97,7 +97,11 @@ def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None
 def _nothing_holds(problems: Problems) -> None:
     able = " or ".join(f"[[load.{name}]]" for name, kind in TERMS.items() if kind.HOLDS)
     more = f", or add {able}" if able else "; a term that would hold it instead is a file that you add"
-    problems.error("body.fixed", NONE, f"nothing holds the body: fix a face{more}, or let it rest on [body.support]")
+    problems.error(
+        "body.fixed",
+        NONE,
+        f"nothing holds the body: fix a face{more}, let it rest on [body.support], or close two jaws on it",
+    )
 
 
 def _check_traction(body: Body, probes: Sequence[Probe], traction: Traction, key: str, problems: Problems) -> None:

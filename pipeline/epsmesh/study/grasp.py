@@ -17,7 +17,7 @@ NOT_CLOSED = "is not computed where two jaws close"
 # Keys of the first jaw alone: both have the same place, axis and friction.
 _OF_FIRST = (
     "at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths",
-    "pull", "pull_direction",
+    "pull", "pull_direction", "slice", "incision",
 )  # fmt: skip
 
 

@@ -59,7 +59,8 @@ _TEXTS = {
     "can be swept.",
     "material.young": "A modulus that varies from place to place; those of a layer are [body.layer.young]. It takes "
     "the place of the value of `young`. Optional; every value can be swept.",
-    "probe": "The tool, called probe in study files and datasets, and its motion.",
+    "probe": "The tool, called probe in study files and datasets, and its motion. Two tables with `together` are the "
+    "jaws of a grasp.",
     "probe.path": "Several points of contact, instead of `at`. Give one of `line`, `circle`, `raster` and "
     "`points`. Optional.",
     "probe.history": "Depth of the tool over time: ramp, hold and sine, or a table. The dataset has the dimension "

@@ -73,7 +73,8 @@ class Output(Section):
     region: Annotated[
         str | None,
         Words(
-            'Region: the name of a layer or an inclusion, "tissue" for the body outside them, "body" for all.',
+            'Region: the name of a layer, an inclusion or a region, "tissue" for the body outside them, "body" for '
+            "all.",
             '"tumour"',
             default="none: at a point, or of a function",
         ),

@@ -171,7 +171,7 @@ class Mesh(Section):
         Literal["auto", "displacement", "mixed"],
         Words(
             "Element: displacement alone, or mixed with pressure, which does not lock. auto: mixed "
-            "from poisson = 0.45 on.",
+            "from poisson = 0.45 on, above it with a law of large displacements; not in degree 1.",
             '"auto"',
         ),
     ] = "auto"

@@ -46,8 +46,8 @@ class FromImage(Segmented, Scanned):
         Field(exclude=True),
         Words(
             "Names of the labels: a file (dataset.json of nnU-Net, label descriptions of ITK-SNAP, a colour table of "
-            "3D Slicer), its path from the folder of the study; or totalsegmentator, totalsegmentator_mr for the "
-            "labels of its tasks total and total_mr.",
+            "3D Slicer or FreeSurfer), its path from the folder of the study; or totalsegmentator, "
+            "totalsegmentator_mr for the labels of its tasks total and total_mr.",
             '"labels.txt"',
             "those in the image",
         ),
@@ -70,7 +70,8 @@ class FromImage(Segmented, Scanned):
     file: Annotated[
         str,
         Words(
-            "File of a label map (NIfTI, NRRD, DICOM), or folder of a DICOM series: its path from the study's folder.",
+            "File of a label map (NIfTI, MGH, NRRD, DICOM), or folder of a DICOM series: its path from the folder "
+            "of the study.",
             '"liver.nii.gz"',
         ),
     ]
