@@ -1,5 +1,6 @@
 """Inclusions in bodies of triangles and in CAD solids: regions of cells, and accuracy of their surface."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -70,6 +71,15 @@ def test_elements_on_an_inclusion_and_in_a_narrow_gap_are_small(body):
     corners = mesh.points[mesh.cells[:, :4]]
     shape = np.linalg.det(corners[:, 1:] - corners[:, :1]) / np.ptp(corners, axis=1).max(axis=1) ** 3
     assert shape.min() > 0.002
+
+
+def test_elements_on_a_far_inclusion_may_be_larger_and_keep_its_volume(meshed):
+    case, fine = meshed
+    coarse = mesh_arrays(replace(case, mesh=case.mesh.with_far_regions(1.0)), ())
+    assert (coarse.regions == 2).sum() < 0.7 * (fine.regions == 2).sum()
+    assert len(coarse.cells) < len(fine.cells)
+    assert volumes(coarse)[2] == pytest.approx(volumes(fine)[2], rel=0.03)
+    assert volumes(coarse)[1] == pytest.approx(volumes(fine)[1], rel=0.01)  # below the tool
 
 
 def test_the_mesh_is_of_places_not_of_materials(body):

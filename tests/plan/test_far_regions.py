@@ -34,3 +34,17 @@ def test_given_sizes_stay_as_they_are_and_keys_tell_the_meshes_apart():
     assert given.mesh.coarseness == 0
     coarser = replace(given, mesh=given.mesh.with_far_regions(1.0))
     assert mesh_key(coarser) != mesh_key(given)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"mesh": CHOSEN | {"rim": "1 mm", "growth": 0.9, "degree": 2}},
+        {"load": {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}, "material": {"density": "1000 kg/m^3"}},
+        {"solve": {"influence": True}},
+    ],
+)
+def test_given_sizes_and_what_asks_more_of_far_regions_keep_elements_small(changes):
+    rungs = rungs_for(case(**changes), 0.02)
+    assert not any(rung.mesh.coarseness for rung in rungs)
+    assert "rim" not in changes.get("mesh", {}) or len(rungs) == 1

@@ -24,7 +24,7 @@ from epsmesh.study.schema import Material, Mesh
 from epsmesh.units import canonical
 
 # Raise by hand when the same input gives another force: earlier records are then no longer used.
-PHYSICS_VERSION = 19
+PHYSICS_VERSION = 20
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
@@ -78,7 +78,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
     tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
-    tail += [f"pulled {case.probe.pulled}"] if case.probe.pulled else []
+    tail += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
     return head, tuple(tail), last, case.probe.half_width
@@ -140,7 +140,7 @@ def operator_key(case: Case) -> str:
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
-    rests += [f"pull {case.probe.pulled}"] if case.probe.pulled else []
+    rests += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
     return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *rests, *fields, *shape])
 

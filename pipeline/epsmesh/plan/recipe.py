@@ -59,9 +59,11 @@ _SQUEEZED = 1.5
 _OF_STICKING, _OF_CURVED, _OF_COEFFICIENT = 0.2, 0.55, 0.04
 # Number of elements between the probe's edge and a fixed face.
 _ACROSS_GAP = 3
-# Expected error bars from which on elements on far regions are larger, and as large as they may be; what they change
-# was measured at the latter (benchmarks/results/organs.md). Steps between them let cases share meshes.
+# Elements on far regions are larger where the expected error bar is above the first value, in so many steps, which let
+# cases share meshes, and as large as they may be from the second on (benchmarks/results/organs.md).
 _COARSE_FROM, _COARSEST_FROM, _STEPS = 5e-3, 1e-2, 4
+# Given ones of these keys stay around regions, too.
+_SIZES = {"rim", "growth", "fine", "coarse", "degree"}
 # Number of elements through the thickness near the probe.
 _THROUGH = 2
 
@@ -91,9 +93,12 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
 def _coarseness(case: Case, mesh: Mesh, bar: float) -> float:
     """Return how much larger elements on far regions may be, from 0 to 1, for the expected error ``bar``.
 
-    They have degree 2, and are far from all that touches the body: the tool alone is known to be.
+    They have degree 2, and the sizes of a recipe. Nothing is asked of the tissue there but its part of F, which goes
+    with the fourth power of the distance: no loads, and no results but forces of the tool.
     """
-    if mesh.degree != 2 or not case.body.embedded or case.jaw or case.body.resting:
+    is_chosen = mesh.degree == 2 and not _SIZES & case.mesh.model_fields_set
+    asks = case.load.acts or case.terms or case.outputs or case.solve.influence
+    if not is_chosen or asks or not case.body.embedded:
         return 0.0
     share = (bar - _COARSE_FROM) / (_COARSEST_FROM - _COARSE_FROM)
     return min(max(int(_STEPS * share), 0), _STEPS) / _STEPS

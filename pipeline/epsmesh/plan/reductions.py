@@ -283,7 +283,7 @@ def _has_lone_depths(operators: list[OperatorStep]) -> bool:
     seen = set[str]()
     for solve in (solve for operator in operators for solve in operator.solves):
         case, probe = solve.case, solve.case.probe
-        if probe.is_unilateral and any(getattr(probe, key) is None for key in probe.SWEPT):
+        if probe.is_unilateral and probe.jaw is None and any(getattr(probe, key) is None for key in probe.SWEPT):
             same = repr((case.body, case.tissues, case.mesh, probe.model_dump(exclude={"depth", "history"})))
             if same in seen:
                 return True

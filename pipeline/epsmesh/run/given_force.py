@@ -24,6 +24,7 @@ _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "f
 # Forces of two jaws, among the further numbers of a record.
 _OF_JAWS = ("jaw_force", "closed_force", "pull_force", "jaw_pull_force", "slip_begins_force", "slip_whole_force")
 _FORCES_OF_JAWS = (*_OF_JAWS, *(f"jaw_force_vector_{axis}" for axis in "xyz"))
+_ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,9 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     force = canonical(found.times * record.force)
     off = max(found.exponent, 1.0) * found.error / found.depth
     barred = _barred(record, off)
-    of_jaw = {name: found.times * barred.largest[name] for name in barred.largest if name in _FORCES_OF_JAWS}
-    largest = barred.largest | of_jaw
+    by = dict.fromkeys(_FORCES_OF_JAWS, found.times)
+    by |= dict.fromkeys(_ENERGIES_OF_PULL, found.times * found.depth / found.solved)
+    largest = {name: by.get(name, 1.0) * value for name, value in barred.largest.items()}
     return replace(barred, force=force, force_vector=(x, y, z), energy=energy, largest=largest)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Protocol, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -37,7 +37,9 @@ class kept(Generic[Value]):
         self.find, self.name, self.__doc__ = find, find.__name__, find.__doc__
 
     def __get__(self, section: Any, owner: type | None = None) -> Value:
-        """Return the value."""
+        """Return the value; on the class, which has none, what finds it."""
+        if section is None:
+            return cast(Value, self)
         try:
             known: dict[str, Any] = section._known
         except AttributeError:

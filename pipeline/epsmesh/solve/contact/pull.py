@@ -130,9 +130,10 @@ def pull_jaws(
             now = path.last.touched
             assert now is not None
             check_edges(body, moved_tool(moved), now)
+            after = _step(body, count, moved, now, along)
         except SolveError as error:
             raise _ended(error, found, body, depth, length) from error
-        before, after, here = found[-1], _step(body, count, moved, now, along), body.positions()
+        before, here = found[-1], body.positions()
         work += (after.moved - before.moved) * (before.force + after.force) / 2
         slips = here - places - (after.moved - before.moved) * along
         normal = before.touched.normal + now.normal
@@ -197,7 +198,7 @@ def with_bars(
     (pressed, at_edge), least = bars, fitted.AT_EDGE_LARGE[elements.degree]
     of_degree = [found_again_bar(share, at_edge, least)[1] for share in coarse.changes(again)]
     of_steps = map(abs, fine.changes(coarse))
-    bar = max(*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True)))
+    bar = float(np.max([*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True))]))
     half, whole, finest = (pull.result(2.0 ** len(elements.body.mirrored)) for pull in (coarse, fine, again))
     found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
     # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
@@ -222,6 +223,8 @@ def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolut
     for number in range(contacts):
         part = body.part(number)
         own = part.solution(touched)
+        if not own.active.any():
+            raise LargeError("a jaw has lost contact")
         forces.append(float((own.forces @ along).sum()))
         shares.append(0.0 if own.slide is None else own.slide.share(part.candidates.weights, own.active))
     return PullStep(moved, touched, tuple(forces), tuple(shares))
