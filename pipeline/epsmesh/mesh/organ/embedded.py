@@ -16,6 +16,7 @@ from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.regions import Embedded
 from epsmesh.shapes.shell import Shell
+from epsmesh.shapes.triangles import edge_keys
 
 # Points of the initial surface of an ellipsoid, and passes of remeshing: only in the second pass points are dense
 # enough for sizes that change fast.
@@ -62,11 +63,10 @@ def _to_sizes(region: Embedded, field: Field) -> tuple[FloatArray, IntArray]:
 def _halved(sheet: Sheet, surface: Closed) -> Sheet:
     """Return the sheet with its edges halved, on the true surface: nearly that of curved edges."""
     count = len(sheet.points)
-    keys = np.sort(sheet.facets[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2) @ np.array([count, 1])
-    keys, inverse = np.unique(keys, return_inverse=True)
+    keys, inverse = np.unique(edge_keys(sheet.facets, count), return_inverse=True)
     middle = surface.project((sheet.points[keys // count] + sheet.points[keys % count]) / 2)
     a, b, c = sheet.facets.T
-    u, v, w = (count + inverse).reshape(-1, 3).T
+    w, u, v = (count + inverse).reshape(-1, 3).T
     facets = np.stack([a, w, v, w, b, u, v, u, c, u, v, w], axis=1).reshape(-1, 3)
     return Sheet(np.vstack([sheet.points, middle]), facets, np.repeat(sheet.group, 4), sheet.sharp)
 
