@@ -33,8 +33,6 @@ ORDER = (
     "organ",
     "organ-tumour",
     "image",
-    "support",
-    "grasp",
 )
 # Bytes of a picture.
 MOST = 150_000

@@ -262,6 +262,13 @@ def _support(study: Study) -> None:
     study["probe"].setdefault("contact", "unilateral")
 
 
+def _loose(study: Study) -> None:
+    """Let a layer lie loose on the rest of the body, and find the contact of the tool with that of it."""
+    flap = {"name": "flap", "thickness": "8 mm", "young": "20 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
+    study["body"].setdefault("layer", []).insert(0, flap | {"contact": "unilateral", "friction": "stick"})
+    study["probe"].setdefault("contact", "unilateral")
+
+
 def _grasp(study: Study) -> None:
     """Let an equal jaw close on the body from the opposite side; its sides hold it, or nothing else."""
     is_round = study["body"]["shape"] in ("box", "cylinder")
@@ -332,6 +339,7 @@ FEATURES = (
     Feature("unilateral", "contact", _update("probe", contact="unilateral")),
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),
     Feature("support that lets go", "support", _support),
+    Feature("loose layer", "support", _loose),
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),

@@ -18,6 +18,7 @@ class Side:
     space: Any
     prescribed: np.ndarray
     children: np.ndarray | None = None
+    pairs: None = None
 
 
 def polynomial(degree):

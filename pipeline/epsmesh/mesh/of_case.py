@@ -12,6 +12,7 @@ from mpi4py import MPI
 from epsmesh.mesh.curve import curve
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.generate import MeshArrays, MeshError, generate
+from epsmesh.mesh.loose import part_layer
 from epsmesh.mesh.meridian import Meridian
 from epsmesh.mesh.parts import Part, refine, reflect_part, split, whole
 from epsmesh.mesh.refine import refined
@@ -61,6 +62,7 @@ def unrefined_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" =
             raise type(error)(f"{error}. {thin}") from error
         raise
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
+    arrays = part_layer(arrays, case.body) if case.body.loose else arrays
     arrays = arrays if scene.straight else curve(arrays, scene)
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
     found = reflect(arrays, _beyond(case, mirrors))

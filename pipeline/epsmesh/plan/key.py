@@ -13,6 +13,7 @@ from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.part import Around
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.regions import Layer, Region
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.tissue import Tissue
@@ -139,6 +140,7 @@ def operator_key(case: Case) -> str:
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
+    rests += [f"loose {loose}"] if (loose := case.body.loose) else []
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     rests += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
@@ -205,11 +207,19 @@ def _body_text(body: Body, stress: float | None = None) -> str:
         region.update(surface=segment.surface.identity)
     for key in (key for key in PIECES if key in content):
         content[key] = [
-            {name: value for name, value in piece.items() if name not in (*Tissue.model_fields, "toughness")}
+            {name: value for name, value in piece.items() if name not in _not_of_shape(region, stress)}
             | ({} if stress is None else _tissue_content(region))
             for piece, region in zip(content[key], getattr(_in_units_of(stress or 1.0, body), key), strict=True)
         ]
     return _text(content)
+
+
+def _not_of_shape(region: Region, stress: float | None) -> tuple[str, ...]:
+    """Return the keys of a region that its text has elsewhere, or has no use for."""
+    keys = *Tissue.model_fields, "toughness"
+    if not isinstance(region, Layer) or region.contact == "bonded":
+        return *keys, "contact", "friction"
+    return keys if stress is not None else (*keys, "friction")
 
 
 @lru_cache(_MANY)

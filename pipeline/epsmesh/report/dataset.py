@@ -57,6 +57,7 @@ _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error"
 _COUNTS = ("dofs", "cells", "iterations")
 _OF_SHAPE = ("unloading", "round_trip")
 _OF_REST = ("support_force", "support_force_error", "lift_off_area", "lift_off_area_error")
+_OF_LOOSE = ("interface_force", "interface_force_error", *_OF_REST[2:])
 _OF_JAW = ("jaw_force", "jaw_force_error", "jaw_contact_area", "jaw_contact_area_error")
 _OF_PULL = tuple(
     f"{name}{bar}"
@@ -74,6 +75,8 @@ _OF_PULL = tuple(
 _ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
 _OF_FRICTION = tuple(f"{name}{bar}" for name in ("slip_area", "friction_force", "torque") for bar in ("", "_error"))
+# Numbers that a record has by their names.
+_FURTHER = (*LARGEST, *_OF_SHAPE, *_OF_REST, *_OF_LOOSE, *_OF_PULL, *_ENERGIES_OF_PULL)
 _PARTS = (
     _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
     _Part(
@@ -91,6 +94,7 @@ _PARTS = (
     _Part(("energy_release_exact", "energy_release_exact_error"), of=_has_slit, is_exact=True),
     _Part(_OF_SHAPE, of=lambda case: case.imaged is not None),
     _Part(_OF_REST, of=lambda case: case.body.resting is not None),
+    _Part(_OF_LOOSE, of=lambda case: case.body.loose is not None),
     _Part(_OF_JAW, of=lambda case: case.jaw is not None),
     _Part(("jaw_torque", "jaw_torque_error"), of=lambda case: case.jaw is not None and case.way.rubs),
     _Part(("jaw_force_vector",), ("component",), of=lambda case: case.jaw is not None),
@@ -192,7 +196,7 @@ def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) ->
         found = record.largest if record and record.is_ok else {}
         return np.array([found.get(f"{name}_{axis}", nan) for axis in "xyz"], dtype=float)
     elif record and (record.is_ok or record.status == NO_CONTACT or own in _OF_FAILURES):
-        is_largest = own in (*LARGEST, *_OF_SHAPE, *_OF_REST, *_OF_PULL, *_ENERGIES_OF_PULL) or own.startswith("jaw_")
+        is_largest = own in _FURTHER or own.startswith("jaw_")
         value = record.largest.get(own, nan) if is_largest else getattr(record, _IN_RECORD.get(own, own))
         if own in _RELATIVE:
             value *= abs(getattr(record, own.removesuffix("_error")))

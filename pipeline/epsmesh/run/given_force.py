@@ -23,7 +23,8 @@ _ENDED = "load steps end there"
 _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
 # Forces of two jaws, among the further numbers of a record.
 _OF_JAWS = ("jaw_force", "closed_force", "pull_force", "jaw_pull_force", "slip_begins_force", "slip_whole_force")
-_FORCES_OF_JAWS = (*_OF_JAWS, *(f"jaw_force_vector_{axis}" for axis in "xyz"))
+_FURTHER = ("interface_force",)
+_FORCES_OF_JAWS = (*_OF_JAWS, *_FURTHER, *(f"jaw_force_vector_{axis}" for axis in "xyz"))
 _ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 
 

@@ -66,8 +66,7 @@ def record_of(solve: Solve, solution: Solution, mesh_seconds: float = 0.0) -> Re
         energy=solution.energy,
         energy_release=solution.release / _front_length(case) if case.way.motion is Motion.SLIT else nan,
         energy_release_error=solution.release_bar,
-        largest=solution.largest
-        | (_of_jaw(case, solution.contact, bar / abs(force)) if case.jaw else of_rest(solution)),
+        largest=solution.largest | _of_others(case, solution, bar / abs(force)),
         **_of_contact(solution.contact, has_history=solution.history is not None),
         **_of_loads(case, solution),
         balance=solution.balance,
@@ -131,6 +130,18 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
     found |= {f"{name}_error": nan if has_history else getattr(contact, f"{name}_bar") for name in _OF_FRICTION}
     found |= {"contact_area": contact.area, "contact_area_error": contact.bar}
     return found | {"contact_radius": contact.radius, "contact_radius_error": contact.bar / 2}
+
+
+def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
+    """Return what a record has of what touches the body besides the tool; ``bar`` is the relative one on the force."""
+    rest = None if solution.contact is None else solution.contact.rest
+    if case.jaw:
+        return _of_jaw(case, solution.contact, bar)
+    if case.body.loose is None or rest is None:
+        return of_rest(solution)
+    force = sum(n * f for n, f in zip(rest.normal, rest.force, strict=True))
+    found = {"interface_force": force, "interface_force_error": rest.force_bar * abs(force)}
+    return found | {"lift_off_area": rest.lifted, "lift_off_area_error": rest.bar * rest.area}
 
 
 def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, float]:

@@ -16,7 +16,7 @@ from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import half_plane_fields, variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
-from epsmesh.scene.model import FIXED, JAW
+from epsmesh.scene.model import FIXED, JAW, LOOSE
 from epsmesh.shapes.contact import first_touch, normal_at_touch
 from epsmesh.shapes.distance import Distance
 from epsmesh.shapes.frame import Frame, Vector
@@ -73,6 +73,7 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     """
     if case.probe.crack:
         raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
+    _check_loose(case, spaces.body.mirrored)
     tool = tool_of(case) if case.way.is_found else None
     degree, conditions = case.mesh.degree, conditions_of(case)
     loads, shape = imaged_loads_of(case), None
@@ -88,6 +89,23 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
             spaces.close()
             show_image(shape.body)
         raise
+
+
+def _check_loose(case: Case, mirrored: tuple[int, ...]) -> None:
+    """Check that something holds the loose layer of a case across the axis; planes of symmetry are ``mirrored``.
+
+    Raises:
+        CaseFailure: if nothing does.
+    """
+    loose = case.body.loose
+    if loose is None or loose.friction == inf or case.body.hold.holds_above(loose.height):
+        return
+    if free := [axis for number, axis in enumerate("xy") if number not in mirrored]:
+        layer = case.body.regions[loose.number].name
+        raise CaseFailure(
+            f'the layer "{layer}" floats: the tissue below it lets it move along {free[0]}, and nothing else prevents '
+            'that; give it friction = "stick", fix the sides of the body, or place the tool in the planes of symmetry'
+        )
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:
@@ -158,19 +176,29 @@ def _pull_of(case: Case) -> Vector | None:
 
 def beds_on(case: Case) -> tuple[str, ...]:
     """Return the groups of facets that contacts besides the tool's may touch, in the order of :func:`beds_of`."""
-    return ((FIXED,) if case.body.resting else ()) + ((JAW,) if case.jaw else ())
+    there = {FIXED: case.body.resting, JAW: case.jaw, LOOSE: case.body.loose}
+    return tuple(name for name, found in there.items() if found)
 
 
 def beds_of(case: Case) -> tuple[Bed, ...]:
-    """Return what touches the body of ``case`` besides the tool, for the same mesh: its support, or a second jaw."""
+    """Return what touches the body of ``case`` besides the tool, for the same mesh.
+
+    It is its support, a second jaw, or the tissue below a loose layer.
+    """
     resting, turn = case.body.resting, case.frame.turn
     turned, found = np.eye(3) if turn is None else turn, list[Bed]()
+    x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
+
+    def level(height: float, friction: float, *, is_tissue: bool = False) -> Bed:
+        surface = plane(turned @ np.array([0.0, 0.0, height]), np.array([x, y, z]))
+        return Bed(surface, (x, y, z), friction, is_tissue=is_tissue)
+
     if resting is not None:
-        low, _ = case.body.heights
-        x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
-        found.append(Bed(plane(turned @ np.array([0.0, 0.0, low]), np.array([x, y, z])), (x, y, z), resting.friction))
+        found.append(level(case.body.heights[0], resting.friction))
     if case.jaw is not None:
         found.append(jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth))
+    if (loose := case.body.loose) is not None:
+        found.append(level(loose.height, loose.friction, is_tissue=True))
     return tuple(found)
 
 

@@ -11,7 +11,7 @@ from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.frame import Frame, Units, Vector
 from epsmesh.shapes.half_plane import HalfPlane
 from epsmesh.shapes.part import Around, is_part_mirrored
-from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Region
+from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Loose, Region
 from epsmesh.shapes.resting import Resting
 from epsmesh.shapes.section import Section, Words, kept
 from epsmesh.shapes.segment import Segment
@@ -187,6 +187,11 @@ class Body(Section, ABC):
         """The support that lets go, on which it rests; None if its support is fixed."""
         return None
 
+    @property
+    def loose(self) -> Loose | None:
+        """The layer that lies loose on the tissue below it; None if all are bonded."""
+        return None
+
     @kept
     def hold(self) -> Support:
         """The fixed part of its boundary, or the part that rests on a support that lets go."""
@@ -341,6 +346,13 @@ class Layered(Drawn):
     def resting(self) -> Resting | None:
         """The support that lets go."""
         return self.support
+
+    @property
+    def loose(self) -> Loose | None:
+        """The layer that lies loose."""
+        pairs = zip(range(len(self.layer)), self.layer, self.interfaces, strict=False)
+        found = (Loose(n, end, layer.friction) for n, layer, end in pairs if layer.contact == "unilateral")
+        return next(found, None)
 
     @property
     def interfaces(self) -> tuple[float, ...]:

@@ -1,11 +1,13 @@
 """Regions of a body with a material of their own: layers under a flat top, and regions wholly inside it."""
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.closed import Closed
+from epsmesh.shapes.friction import Friction
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.section import Name, Words
 from epsmesh.shapes.tissue import Tissue
@@ -36,6 +38,32 @@ class Layer(Region):
         Toughness | None,
         Words("Toughness of the layer, for a tool that is inserted.", '"500 J/m^2"', default="that of the probe's key"),
     ] = None
+    contact: Annotated[
+        Literal["bonded", "unilateral"],
+        Words(
+            "Contact of the layer with the tissue below it: bonded, or unilateral, where it presses, slides, and may "
+            "lift off.",
+            '"unilateral"',
+        ),
+    ] = "bonded"
+    friction: Annotated[
+        Friction,
+        Words(
+            "Coulomb's coefficient of friction between the layer and the tissue below it, or stick: tissue that "
+            "touches does not slide. The dataset writes stick as infinity.",
+            '[0.0, 0.3, "stick"]',
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True)
+class Loose:
+    """A layer that lies loose on the tissue below it: its ``number`` among the layers, from 0, its lower end (m), and
+    Coulomb's coefficient of ``friction`` there, infinite where it sticks."""
+
+    number: int
+    height: float
+    friction: float
 
 
 class Embedded(Region):

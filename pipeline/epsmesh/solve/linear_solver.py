@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.kernels.multigrid import Cycle, SmoothedLevel, free, interpolation
-from epsmesh.solve.kernels.product import operator_of
+from epsmesh.solve.kernels.product import Joined, operator_of
 from epsmesh.solve.krylov import INDEFINITE, algebraic, check_converged, explained, factorised, keep, solver_of
 from epsmesh.stages import stage
 
@@ -34,7 +34,7 @@ class Level:
     """One level of a hierarchy: its space, its operator and the local dofs (unrolled) that are prescribed.
 
     ``jumps`` says that the material jumps between regions. ``held`` are prescribed dofs that the operator ignores: the
-    multigrid cycle accounts for them. ``children``: see :class:`.Side`.
+    multigrid cycle accounts for them. ``children`` and ``pairs``: see :class:`.Side`.
     """
 
     space: Any
@@ -43,6 +43,7 @@ class Level:
     jumps: bool = False
     held: np.ndarray | None = None
     children: Int32Array | None = None
+    pairs: Joined | None = None
 
     @property
     def degree(self) -> int:

@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from itertools import product
-from math import dist
+from math import dist, inf
 from typing import cast
 
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import PlaceError
+from epsmesh.shapes.friction import STICK
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.probe import Probe
-from epsmesh.shapes.regions import Embedded
+from epsmesh.shapes.regions import Embedded, Layer
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.support import NONE, Faces, NamedFace
@@ -41,6 +42,7 @@ def check_loads(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
         with problems.about(body=body):
             _check_capsules(body, problems)
             _check_rest(body, problems)
+            _check_loose(body, problems)
     problems.each(lambda body, _: _check_imaged(body, loads, problems), body=bodies)
     is_grasped = any(probe.jaw for probe in probes)
     for body, load in product(bodies, loads):
@@ -83,6 +85,22 @@ def _check_rest(body: Body, problems: Problems) -> None:
     if body.resting is not None and body.fixed != NONE:
         held = 'must be "none" with [body.support]: the part that rests on it is not fixed, nor is another'
         problems.error("body.fixed", body.model_dump()["fixed"], held)
+
+
+def _check_loose(body: Body, problems: Problems) -> None:
+    """Report a second loose layer, one that nothing is below, and friction of a layer that is bonded."""
+    loose = body.loose
+    for number, layer in enumerate(body.pieces.get("layer", ())):
+        assert isinstance(layer, Layer)
+        key = f"body.layer[{number + 1}]"
+        if layer.contact == "bonded":
+            if layer.friction:
+                without = 'is of a layer with contact = "unilateral": a bonded one does not slide. Omit it'
+                problems.error(f"{key}.friction", STICK if layer.friction == inf else layer.friction, without)
+        elif loose is None:
+            problems.error(f"{key}.contact", layer.contact, "must be bonded in the last layer: no tissue is below it")
+        elif number != loose.number:
+            problems.error(f"{key}.contact", layer.contact, "is computed of one layer only, and another one has it")
 
 
 def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None:

@@ -1,4 +1,4 @@
-"""Contacts besides the tool's: a support on which a body rests and off which it may lift, or an opposite jaw.
+"""Contacts besides the tool's: a support off which a body may lift, an opposite jaw, or tissue below a loose layer.
 
 A contact is a constraint between nodes of a surface and a distance. All contacts of a body are found together, in one
 loop: the tool's nodes have the tool's distance, those above a bed have the bed's.
@@ -24,6 +24,7 @@ class Bed:
     A jaw advances along its normal by ``pace`` times the tool's depth. ``height`` are its heights (m) at rest above
     points (n, 3) of the undeformed surface, along its axis; ``ends_at`` is a mask of points (n, 3) on the edge of its
     candidates: true where it ends itself. Both are None for a support. ``foot`` (m) is on a jaw's axis.
+    ``is_tissue``: it is the tissue below a loose layer, whose displacements are those relative to it.
     """
 
     distance: Callable[[FloatArray, float], Distance]
@@ -33,6 +34,7 @@ class Bed:
     height: Callable[[FloatArray], FloatArray] | None = None
     ends_at: Callable[[FloatArray], BoolArray] | None = None
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    is_tissue: bool = False
 
     @property
     def is_support(self) -> bool:

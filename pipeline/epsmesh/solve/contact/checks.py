@@ -9,7 +9,7 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.balance import check_work
 from epsmesh.solve.contact.active_set import ContactError
 from epsmesh.solve.contact.surface import Candidates
-from epsmesh.solve.contact.touching import ContactSolution, SteppedTissue, Tissue
+from epsmesh.solve.contact.touching import ContactSolution, SteppedTissue
 from epsmesh.solve.newton import LargeError
 
 
@@ -40,13 +40,13 @@ def check_edge(ends_at: Callable[[FloatArray], BoolArray], candidates: Candidate
         )
 
 
-def check_support(tissue: Tissue, touched: ContactSolution) -> None:
-    """Check that the tool does not reach the support.
+def check_support(fixed: BoolArray, gap: FloatArray) -> None:
+    """Check that the tool does not reach the support, by its ``gap`` (n) above nodes, of which (n, d) are ``fixed``.
 
     Raises:
         ContactError: if it does.
     """
-    if np.any(touched.gap[tissue.fixed.all(axis=1)] < 0):
+    if np.any(gap[fixed.all(axis=1)] < 0):
         raise ContactError("the probe reaches the fixed part of the body: no displacement satisfies both")
 
 

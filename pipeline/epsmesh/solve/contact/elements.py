@@ -19,7 +19,8 @@ from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface, normal_dofs
+from epsmesh.solve.contact.levels import Hierarchy, Surface, normal_dofs
+from epsmesh.solve.contact.numbering import Numbering
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.surface_body import SurfaceBody
 from epsmesh.solve.contact.touching import Tissue

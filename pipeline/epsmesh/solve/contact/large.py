@@ -241,7 +241,8 @@ class LargeContactSolution:
             LargeError: if the work of the reactions is not the change of the energy.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
-        check_support(self.body, self.touched)
+        tool = self.body.part()
+        check_support(tool.of(self.body.fixed), tool.of(self.touched.gap))
         check_edges(self.body, self.tool, self.touched)
         check_energy(self.body, self.touched, _SMALL)
 
@@ -250,7 +251,7 @@ class LargeContactSolution:
         space = self.body.elements.displacements
         local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
         support = float(global_sum(space.comm, np.array([local]))[0])
-        support += sum(float(bed.force[2]) for bed in self.rests)
+        support += sum(float(rest.force[2]) for rest in self.rests if not rest.bed.is_tissue)
         support -= float(self.body.on_terms[2])
         balance = abs(support / self.force - 1)
         if self.beside is not None and self.beside.pulls:

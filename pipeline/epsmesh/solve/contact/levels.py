@@ -1,22 +1,20 @@
 """Multigrid operators in which candidate nodes are fixed along the probe's axis, different ones for each active set."""
 
 from contextlib import ExitStack
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from epsmesh.scene.model import PROBE
-from epsmesh.solve.compiled import global_sum
+from epsmesh.arrays import BoolArray, Int32Array
+from epsmesh.scene.model import BELOW, LOOSE, PROBE
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
+from epsmesh.solve.contact.numbering import Numbering, Pairs, pairs_of
 from epsmesh.solve.contact.surface import Candidates, find_candidates
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.kernels.product import is_product
+from epsmesh.solve.krylov import keep
 from epsmesh.solve.linear_solver import Level
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import ElasticSpace, Spaces
@@ -33,6 +31,7 @@ class Surface:
     def __init__(self, spaces: Spaces, conditions: Conditions = WITHOUT_FOOTPRINT):
         self.spaces, self._conditions = spaces, conditions.without_footprint
         self._found: dict[int, Candidates] = {}
+        self._pairs: dict[int, Pairs | None] = {}
 
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
@@ -41,6 +40,19 @@ class Surface:
             groups = (PROBE, *self._conditions.beds)
             self._found[degree] = find_candidates(self.spaces.body, space.space, space.means, groups)
         return self._found[degree]
+
+    def pairs(self, degree: int) -> Pairs | None:
+        """Return the pairs of nodes of a loose layer and the tissue below it; None without one; collective."""
+        if degree not in self._pairs:
+            beds, found = self._conditions.beds, None
+            if LOOSE in beds:
+                own = self.of(degree).of_contacts[1 + beds.index(LOOSE)]
+                space = self.space(degree)
+                is_free = np.ones(space.owned)
+                is_free[space.prescribed_owned] = 0.0
+                found = pairs_of(space.space, self.spaces.body.facets[BELOW], self.of(degree), own, is_free)
+            self._pairs[degree] = found
+        return self._pairs[degree]
 
     def space(self, degree: int) -> ElasticSpace:
         """Return the space of a ``degree`` without a tool; collective."""
@@ -51,64 +63,6 @@ class Surface:
         found = elements_of(self.spaces, degree, self._conditions, element)
         stack.callback(found.close)
         return found
-
-
-class Numbering:
-    """Positions of the candidates among the local dofs of a space, and transfer of values from there to all ranks.
-
-    ``local`` (n) are the blocks of this rank, −1 where it has none; ``is_owned`` (n) are those that it owns.
-    """
-
-    def __init__(self, space: Any, numbers: IntArray):
-        """Find nodes with global ``numbers`` (n) in ``space``."""
-        index_map = space.dofmap.index_map
-        self._comm: MPI.Comm = space.mesh.comm
-        local = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-        known = np.asarray(index_map.local_to_global(local), dtype=np.int64)
-        order = np.argsort(known)
-        place = np.searchsorted(known, numbers, sorter=order)
-        at = np.append(order, -1)[place]
-        self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
-        self.is_owned = (self.local >= 0) & (self.local < index_map.size_local)
-
-    def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
-        """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
-        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
-        return np.sort(3 * self.local[here] + 2).astype(np.int32)
-
-    def all_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
-        """Return the local dofs of the ``chosen`` (n) along all axes."""
-        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
-        return np.sort((3 * self.local[here][:, None] + np.arange(3)).ravel()).astype(np.int32)
-
-    def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
-        """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
-        here = chosen & self.is_owned
-        into[3 * self.local[here] + 2] = values[here]
-
-    def gather(self, values: FloatArray) -> FloatArray:
-        """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
-        found = np.zeros(len(self.local))
-        found[self.is_owned] = values[3 * self.local[self.is_owned] + 2]
-        return global_sum(self._comm, found)
-
-    def gather_vectors(self, values: FloatArray) -> FloatArray:
-        """Return all entries, (n, 3), of ``values`` on owned dofs (unrolled), on every rank; collective."""
-        found = np.zeros((len(self.local), 3))
-        found[self.is_owned] = values.reshape(-1, 3)[self.local[self.is_owned]]
-        return global_sum(self._comm, found)
-
-    def put_vectors(self, into: FloatArray, values: FloatArray) -> None:
-        """Write ``values`` (n, 3) into an array that begins with the owned dofs (unrolled)."""
-        into[self._unrolled] = values[self.is_owned]
-
-    def add_vectors(self, into: FloatArray, values: FloatArray) -> None:
-        """Add ``values`` (n, 3) to such an array."""
-        into[self._unrolled] += values[self.is_owned]
-
-    @cached_property
-    def _unrolled(self) -> Int32Array:
-        return np.asarray(3 * self.local[self.is_owned][:, None] + np.arange(3))
 
 
 class Hierarchy:
@@ -125,7 +79,14 @@ class Hierarchy:
         degrees = [degree] if direct else range(1, degree + 1)
         found = [surface.space(d) for d in degrees]
         self._operators = [
-            HeldOperator(space, law, stack, direct=direct, masked=masks and not direct and space.degree > 1)
+            HeldOperator(
+                space,
+                law,
+                stack,
+                direct=direct,
+                masked=masks and not direct and space.degree > 1,
+                pairs=surface.pairs(space.degree),
+            )
             for space in found
         ]
         self._candidates = [surface.of(d) for d in degrees]
@@ -169,9 +130,21 @@ class HeldOperator:
     ``free`` has the conditions of the space alone. With ``masked`` the smoothers fix the dofs, not the operator.
     """
 
-    def __init__(self, space: ElasticSpace, law: MaterialLaw, stack: ExitStack, *, direct: bool, masked: bool):
-        """Assemble; collective. Matrices are freed with the ``stack``."""
+    def __init__(
+        self,
+        space: ElasticSpace,
+        law: MaterialLaw,
+        stack: ExitStack,
+        *,
+        direct: bool,
+        masked: bool,
+        pairs: Pairs | None = None,
+    ):
+        """Assemble; collective. Matrices are freed with the ``stack``. With ``pairs`` the operator is that of S."""
         matrix = stack.enter_context(space.lend(law, entries=direct or space.degree == 1))
+        self._pairs = pairs
+        if pairs is not None:
+            matrix = keep(stack, _joined(matrix, pairs, stack))
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
         self.free, self._is_held, self._stack = matrix, False, stack
         if not masked and not is_product(matrix):
@@ -200,7 +173,18 @@ class HeldOperator:
             prescribed=np.union1d(space.prescribed, dofs),
             jumps=not is_uniform or space.factors is not None,
             held=dofs if self._is_masked else None,
+            pairs=self._pairs,
         )
+
+
+def _joined(matrix: PETSc.Mat, pairs: Pairs, stack: ExitStack) -> PETSc.Mat:
+    """Return an operator in the unknowns of ``pairs``."""
+    if is_product(matrix):
+        return matrix.getPythonContext().joined(pairs).matrix()
+    found = matrix.ptap(keep(stack, pairs.matrix(matrix)))
+    found.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    found.setOption(PETSc.Mat.Option.SPD, True)
+    return found
 
 
 def normal_dofs(space: ElasticSpace, facets: Int32Array) -> Int32Array:

@@ -83,8 +83,8 @@ class Rest:
         return float(self.force @ np.array(self.bed.normal))
 
     def force_bar(self, finer: "Rest", degree: int) -> float:
-        """Return the relative bar on the force of a jaw, from contact that was found again in a ``finer`` degree."""
-        if self.bed.is_support:
+        """Return the relative bar on the force of a jaw, or of tissue, by contact in a ``finer`` degree."""
+        if self.bed.is_support and not self.bed.is_tissue:
             return nan
         return found_again_bar(1 - finer.pressed / self.pressed, self.area.bar, fitted.AT_EDGE_LARGE[degree])[1]
 

@@ -5,6 +5,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
+from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.deformed import solve_contact
 from epsmesh.solve.contact.placed import placed_tool
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -67,6 +68,11 @@ def settle(body: DeformedBody, tool: Tool, guess: FloatArray | None = None) -> C
     body.state = path.last.state
     if limit:
         return touched[-1]
-    left = whole_force(touched[-1].forces.sum(axis=0) - body.on_terms, body.elements.body.mirrored)
+    space, forces = body.elements.displacements, touched[-1].forces.copy()
+    for number, bed in enumerate(tool.beds, start=1):
+        if bed.is_tissue:  # of the body itself
+            forces[body.part(number).nodes] = 0.0
+    fixed = global_sum(space.comm, body.residual().reshape(-1, 3)[space.fixed_owned].sum(axis=0))
+    left = whole_force(forces.sum(axis=0) + fixed - body.on_terms, body.elements.body.mirrored)
     check_balance(float(np.linalg.norm(left)) / (2.0 ** len(body.elements.body.mirrored) * body.size_on_terms))
     return touched[-1]

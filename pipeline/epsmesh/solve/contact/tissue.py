@@ -11,7 +11,8 @@ from epsmesh.arrays import FloatArray
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.deformed import LEFT
-from epsmesh.solve.contact.levels import Numbering, Surface
+from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.numbering import Numbering
 from epsmesh.solve.contact.parts import TOOL, Part, part_of
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
@@ -58,13 +59,13 @@ class DeformedBody:
         if applied is not None:
             self._body.carry(applied)
         self._unit = elements.unit(law)
-        self._numbering = Numbering(space.space, self.candidates.numbers)
+        self._numbering, self._pairs = Numbering(space.space, self.candidates.numbers), surface.pairs(elements.degree)
         self._places = self.candidates.points
         if space.body.imaged is not None:
             self._places = self._numbering.gather_vectors(space.places)
         self._tangent: TurnedTangent
         if method == "direct":
-            self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, stack)
+            self._tangent = FactorisedTangent(elements, law, self._body, self._numbering, surface, stack)
         else:
             self._tangent = IteratedTangent(elements, law, self._body, self._numbering, surface, stack)
         elements.set_law(law)
@@ -93,8 +94,8 @@ class DeformedBody:
         self._from, self._is_current, self._energy = values.copy(), False, None
 
     def positions(self) -> FloatArray:
-        """Return the nodes' deformed positions (n, 3), in m."""
-        return self.places + self._numbering.gather_vectors(self._now.array[: self._space.owned])
+        """Return the nodes' deformed positions (n, 3), in m; of a loose layer, as the tissue below sees them."""
+        return self.places + self._moved(self._now.array[: self._space.owned])
 
     def forces(self) -> FloatArray:
         """Return the nodal forces (n, 3), N; zero at prescribed components."""
@@ -111,6 +112,8 @@ class DeformedBody:
     def unbalanced(self) -> float:
         """Return the norm (N) of the residual at all other free dofs."""
         left = self._forces().copy()
+        if self._pairs is not None:
+            self._pairs.fold(left)
         left[self._space.prescribed_owned] = 0.0
         self._numbering.put_vectors(left, np.zeros(self.fixed.shape))
         return float(np.sqrt(global_sum(self._space.comm, np.array([left @ left]))[0]))
@@ -129,11 +132,13 @@ class DeformedBody:
             self._tangent.multiply(self._change, right)
             right.array[:] = -right.array - self._forces() / self._unit
             self._numbering.add_vectors(right.array, constraint.forces / self._unit)
+            if self._pairs is not None:
+                self._pairs.react(right.array, constraint.forces / self._unit)
             target = LEFT * float(np.linalg.norm(self.forces())) / self._unit
             self._tangent.solve(constraint, right, self._change, target)
             self.slope = None if self._body.is_mixed else -self._residual.dot(self._change)
             self._tangent.multiply(self._change, right)
-            moved = self._numbering.gather_vectors(self._change.array[: self._space.owned])
+            moved = self._moved(self._change.array[: self._space.owned])
             change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])
         self.iterations += 1
         return self.forces() + change + np.einsum("nij,nj->ni", constraint.turning, moved)
@@ -211,6 +216,13 @@ class DeformedBody:
         """Set the state to the fields of the forms of ``coarse``."""
         self.elements.interpolate(coarse)
         self.state = self.elements.values
+
+    def _moved(self, values: FloatArray) -> FloatArray:
+        """Return the displacements (n, 3) of the nodes, of a loose layer relative to the tissue below it."""
+        found = self._numbering.gather_vectors(values)
+        if self._pairs is not None:
+            self._pairs.relative(found, values)
+        return found
 
     # ---- the linear system ------------------------------------------------------------------------------
 

@@ -14,7 +14,8 @@ from petsc4py import PETSc
 
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.levels import Hierarchy, Numbering, Surface
+from epsmesh.solve.contact.levels import Hierarchy, Surface
+from epsmesh.solve.contact.numbering import Numbering
 from epsmesh.solve.elements.assembled import AssembledTangent
 from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.displacement import DisplacementSolver
@@ -35,9 +36,16 @@ class TurnedTangent(ABC):
     """The tangent K - Σ λ H of a ``body`` with contact, in the unit of the forms. Methods are collective."""
 
     def __init__(
-        self, elements: Elements, law: MaterialLaw, body: HyperelasticBody, numbering: Numbering, stack: ExitStack
+        self,
+        elements: Elements,
+        law: MaterialLaw,
+        body: HyperelasticBody,
+        numbering: Numbering,
+        surface: Surface,
+        stack: ExitStack,
     ):
         """Prepare; what is made is freed with the stack."""
+        self._pairs = surface.pairs(elements.degree)
         self._elements, self._space = elements, elements.displacements
         self._law, self._unit, self._stack = law, elements.unit(law), stack
         self._body, self._numbering = body, numbering
@@ -111,7 +119,7 @@ class FactorisedTangent(TurnedTangent):
             change.array[owned:] += found.array[owned:]
 
     def _turn(self, constraint: Constraint) -> PETSc.Mat:
-        """Return the orthogonal matrix Q of the frames, on displacements."""
+        """Return the matrix of the frames, on displacements: an orthogonal one, or S times it where tissue is loose."""
         space, blocks = self._space, self._space.owned // 3
         frames = np.broadcast_to(np.eye(3), (blocks, 3, 3)).copy()
         frames[self._numbering.local[self._here]] = constraint.frames[self._here]
@@ -120,7 +128,11 @@ class FactorisedTangent(TurnedTangent):
         columns = np.broadcast_to(columns, (blocks, 3, 3)).astype(PETSc.IntType).ravel()
         rows = np.arange(0, len(columns) + 1, 3, dtype=PETSc.IntType)
         size = (space.owned, space.size)
-        return PETSc.Mat().createAIJ((size, size), csr=(rows, columns, frames.ravel()), comm=space.comm)
+        found = PETSc.Mat().createAIJ((size, size), csr=(rows, columns, frames.ravel()), comm=space.comm)
+        if self._pairs is None:
+            return found
+        with ExitStack() as stack:
+            return keep(stack, self._pairs.matrix(found)).matMult(keep(stack, found))
 
     def _turned(self, turn: PETSc.Mat, held: Int32Array, stack: ExitStack) -> PETSc.Mat:
         """Return the tangent in the turned frames, with the ``held`` slots eliminated."""
@@ -157,7 +169,7 @@ class IteratedTangent(TurnedTangent):
         Raises:
             SolveError: if the set-up fails.
         """
-        super().__init__(elements, law, body, numbering, stack)
+        super().__init__(elements, law, body, numbering, surface, stack)
         elastic = elements.elastic(law)
         self._hierarchy = Hierarchy(surface, elements.degree, elastic, stack, direct=False, masks=elements.masks)
         self._solver: Solver | None = None
@@ -187,9 +199,9 @@ class IteratedTangent(TurnedTangent):
         whole, image = self._work
         whole.array[:] = x.array_r
         whole.array[self._held] = 0.0
-        self._rotate(whole.array, "nij,nj->ni")
+        self._turn(whole)
         self.multiply(whole, image)
-        self._rotate(image.array, "nji,nj->ni")
+        self._turn_back(image)
         image.array[self._held] = x.array_r[self._held]
         result.array[:] = image.array
 
@@ -198,10 +210,10 @@ class IteratedTangent(TurnedTangent):
         self._frames, self._held = constraint.frames[self._here], self._slots(constraint)
         with ExitStack() as stack, self._body.state() as load, self._body.state() as found, explained():
             load.array[:] = right.array
-            self._rotate(load.array, "nji,nj->ni")
+            self._turn_back(load)
             load.array[self._held] = 0.0
             self._iterate(constraint, load, found, target, stack)
-            self._rotate(found.array, "nij,nj->ni")
+            self._turn(found)
             change.axpy(1.0, found)
 
     def _iterate(
@@ -246,6 +258,18 @@ class IteratedTangent(TurnedTangent):
             return self._solver.saddle.preconditioner(elements.compliance(self._law), stack)
         assert isinstance(self._solver, DisplacementSolver)
         return self._solver.linear
+
+    def _turn(self, change: PETSc.Vec) -> None:
+        """Change displacements in the turned frames to those along the axes."""
+        self._rotate(change.array, "nij,nj->ni")
+        if self._pairs is not None:
+            self._pairs.join(change.array)
+
+    def _turn_back(self, forces: PETSc.Vec) -> None:
+        """Change forces along the axes to those in the turned frames."""
+        if self._pairs is not None:
+            self._pairs.fold(forces.array)
+        self._rotate(forces.array, "nji,nj->ni")
 
     def _rotate(self, values: FloatArray, how: str) -> None:
         values[self._dofs] = np.einsum(how, self._frames, values[self._dofs])

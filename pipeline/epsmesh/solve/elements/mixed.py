@@ -168,6 +168,8 @@ class MixedElements(Elements):
             earlier.close()
         with ExitStack() as stack:
             coupling = keep(stack, self.pressures.holding(held, entries=direct))
+            if (pairs := levels[-1].pairs) is not None:
+                coupling = keep(stack, coupling.getPythonContext().joined(pairs).matrix())
             _, mass = self.pressures.blocks(entries=direct)
             saddle = self.saddle_of(levels, self.elastic(law), coupling, mass)
             found = MixedSolver(self, law, stack.enter_context(SaddleSolver(saddle, direct=direct)), is_exact=direct)

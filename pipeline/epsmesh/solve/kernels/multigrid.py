@@ -20,7 +20,7 @@ from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.mesh.curve import EDGES
 from epsmesh.solve.kernels.cells import Ghosts, summed
 from epsmesh.solve.kernels.native import Single, call
-from epsmesh.solve.kernels.product import CellOperator
+from epsmesh.solve.kernels.product import CellOperator, Joined
 from epsmesh.stages import stage
 
 # Chebyshev's iteration: steps, lower end of its interval as a share of the largest eigenvalue, safety factor on the
@@ -45,7 +45,7 @@ class Side(Protocol):
     """A vector space and its prescribed local dofs (unrolled).
 
     ``children`` (cells, 10) are the points of the next finer mesh in each cell: its corners, and those that halve its
-    edges; None if the next space is on the same mesh.
+    edges; None if the next space is on the same mesh. ``pairs`` are those of its unknowns, None for displacements.
     """
 
     @property
@@ -56,6 +56,9 @@ class Side(Protocol):
 
     @property
     def children(self) -> Int32Array | None: ...  # noqa: D102
+
+    @property
+    def pairs(self) -> Joined | None: ...  # noqa: D102
 
 
 class Rows(Protocol):
@@ -139,6 +142,31 @@ class Interpolation:
         found = np.zeros(len(self.coarse_free), dtype=np.float32)
         self.rows.restrict(fine, self.fine_free, found)
         coarse[:] = self.ghosts.folded(found, 3)
+        coarse *= self.coarse_free[: len(coarse)]
+
+
+@dataclass(frozen=True)
+class JoinedInterpolation(Interpolation):
+    """Interpolation between the unknowns of ``pairs``, of the coarse space and of the fine one."""
+
+    pairs: tuple[Joined, Joined]
+
+    def prolong(self, coarse: Single, fine: Single) -> None:
+        """Add the prolongation of ``coarse`` to ``fine``."""
+        (below, above), given, found = self.pairs, coarse * self.coarse_free[: len(coarse)], np.zeros_like(fine)
+        below.join(given)
+        self.rows.prolong(self.ghosts.extended(given, 3), np.ones_like(self.fine_free), found)
+        above.part(found)
+        fine += found * self.fine_free[: len(fine)]
+
+    def restrict(self, fine: Single, coarse: Single) -> None:
+        """Write the restriction of ``fine``, the transposed prolongation, into ``coarse``."""
+        (below, above), given = self.pairs, fine * self.fine_free[: len(fine)]
+        above.unfold(given)
+        found = np.zeros(len(self.coarse_free), dtype=np.float32)
+        self.rows.restrict(given, np.ones_like(self.fine_free), found)
+        coarse[:] = self.ghosts.folded(found, 3)
+        below.fold(coarse)
         coarse *= self.coarse_free[: len(coarse)]
 
 
@@ -339,6 +367,8 @@ def interpolation(coarse: Side, fine: Side) -> Interpolation:
     rows: Rows = InCells(cell, position, below, weights)
     if (compat.degree(coarse.space), degree) == (1, 2):
         rows = OnEdges(below[cell[:, None], _ENDS[position]])
+    if coarse.pairs is not None and fine.pairs is not None:
+        return JoinedInterpolation(rows, free(coarse), free(fine), Ghosts(coarse.space), (coarse.pairs, fine.pairs))
     return Interpolation(rows, free(coarse), free(fine), Ghosts(coarse.space))
 
 

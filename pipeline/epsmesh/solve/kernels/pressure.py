@@ -14,7 +14,7 @@ from epsmesh import compat
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.kernels.cells import Ghosts, owned_cells, reference
 from epsmesh.solve.kernels.native import call
-from epsmesh.solve.kernels.product import CellStiffness, bernstein
+from epsmesh.solve.kernels.product import CellStiffness, Joined, bernstein
 
 
 class CellPressures:
@@ -28,6 +28,7 @@ class CellPressures:
         self.ghosts, dofs = Ghosts(pressures), owned_cells(pressures)
         self.comm, self.cells, self.degree = cells.comm, cells, compat.degree(pressures)
         self._prescribed = cells.prescribed
+        self._pairs: Joined | None = None
         self._dofs = cells.lanes.spread(dofs[cells.lanes.which])
         self._roots = cells.roots
         weights, values, _ = reference(self.degree, 2 * self.degree)
@@ -62,11 +63,19 @@ class CellPressures:
         other._prescribed = np.union1d(self._prescribed, dofs).astype(np.int32)
         return other
 
+    def joined(self, pairs: Joined) -> "CellPressures":
+        """Return a copy for other unknowns of the displacement: see :meth:`.CellOperator.joined`."""
+        other = copy(self)
+        other._pairs = pairs
+        return other
+
     def dilation(self, x: FloatArray, *, whole: bool = False) -> FloatArray:
         """Return B x for owned displacements; prescribed ones count as zero unless ``whole``."""
         given = x.copy()
         if not whole:
             given[self._prescribed] = 0.0
+        if self._pairs is not None:
+            self._pairs.join(given)
         found = np.zeros(self.ghosts.local)
         self._couple("dilation", self.cells.ghosts.extended(given, 3), found)
         return self.unit * self.ghosts.folded(found, 1)
@@ -76,6 +85,8 @@ class CellPressures:
         found = np.zeros(3 * self.cells.ghosts.local)
         self._couple("pull", self.ghosts.extended(x, 1), found)
         result = self.unit * self.cells.ghosts.folded(found, 3)
+        if self._pairs is not None:
+            self._pairs.fold(result)
         if not whole:
             result[self._prescribed] = 0.0
         return result
@@ -114,6 +125,10 @@ class Coupling:
     def holding(self, dofs: Int32Array) -> "Coupling":
         """Return B with zero columns for owned ``dofs`` (unrolled), too."""
         return Coupling(self.pressures.holding(dofs))
+
+    def joined(self, pairs: Joined) -> "Coupling":
+        """Return B S: see :meth:`.CellOperator.joined`."""
+        return Coupling(self.pressures.joined(pairs))
 
     def matrix(self) -> PETSc.Mat:
         """Return B as a PETSc matrix; the caller destroys it."""

@@ -194,6 +194,16 @@ class Cells(Protocol):
     def diagonal(self, coefficients: list[np.ndarray]) -> Single: ...  # noqa: D102
 
 
+class Joined(Protocol):
+    """Other unknowns v of an operator, u = S v: see :class:`epsmesh.solve.contact.numbering.Pairs`."""
+
+    def join(self, values: np.ndarray) -> None: ...  # noqa: D102
+    def part(self, values: np.ndarray) -> None: ...  # noqa: D102
+    def unfold(self, values: np.ndarray) -> None: ...  # noqa: D102
+    def fold(self, values: np.ndarray) -> None: ...  # noqa: D102
+    def fold_blocks(self, blocks: np.ndarray) -> None: ...  # noqa: D102
+
+
 class CellOperator:
     """A matrix-free stiffness or tangent, with the ``coefficients`` of cells by precision: a context for PETSc.
 
@@ -205,6 +215,13 @@ class CellOperator:
     def __init__(self, cells: Cells, coefficients: dict[str, list[np.ndarray]], further: Sequence[SparsePart] = ()):
         self._cells, self.rows, self.prescribed, self.comm = cells, cells.ghosts.owned, cells.prescribed, cells.comm
         self._coefficients, self._further = coefficients, further
+        self._pairs: Joined | None = None
+
+    def joined(self, pairs: Joined) -> "CellOperator":
+        """Return the operator Sᵀ A S of other unknowns; it shares everything else."""
+        other = copy(self)
+        other._pairs = pairs
+        return other
 
     def holding(self, dofs: Int32Array) -> "CellOperator":
         """Return the operator with ``dofs`` (unrolled) prescribed, too; it shares everything else."""
@@ -253,12 +270,19 @@ class CellOperator:
         found = self._cells.ghosts.folded(blocks.reshape(-1), 9).reshape(-1, 9)
         for part in self._further:
             found += part.diagonal()
+        if self._pairs is not None:
+            self._pairs.fold_blocks(found)
         return found
 
     def _write(self, x: np.ndarray, y: np.ndarray) -> None:
+        if self._pairs is not None:
+            x = x.copy()
+            self._pairs.join(x)
         self._write_cells(x, y)
         for part in self._further:
             part.add_product(x, y)
+        if self._pairs is not None:
+            self._pairs.fold(y)
 
     def _write_cells(self, x: np.ndarray, y: np.ndarray) -> None:
         cells, coefficients = self._cells, self._coefficients[precision(x)]

@@ -178,7 +178,7 @@ class RoundToolIndentation(ContactIndentation):
         return replace(self._touch.placed(fraction * self._depth), depth=self._depth)
 
     def _check(self, touched: ContactSolution) -> None:
-        check_support(self._touch.tissue, touched)
+        check_support(self._touch.tissue.fixed, touched.gap)
 
     def _measure(self, touched: ContactSolution, fraction: float) -> None:
         found, is_touched = replace(self._touch, touched=touched), bool(touched.active.any())

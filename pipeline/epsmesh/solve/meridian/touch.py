@@ -302,6 +302,6 @@ class MeridianTouch:
         Raises:
             SolveError: if forces do not balance, the work is not the change of the energy, or the support is touched.
         """
-        check_support(self.tissue, self._contact)
+        check_support(self.tissue.fixed, self._contact.gap)
         check_balance(self.balance)
         check_energy(self.tissue, self._contact, _SMALL, _ROUNDING * self.volume)

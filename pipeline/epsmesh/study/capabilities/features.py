@@ -164,8 +164,9 @@ def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
 
 def has_terms(scene: Scene) -> bool:
     """Return whether anything acts on the body besides its law, the tool and dead loads: terms, a support that lets
-    go, or a second jaw."""
-    return bool(terms_of(scene)) or scene.body.resting is not None or scene.probe.jaw is not None
+    go, a loose layer, or a second jaw."""
+    touched = scene.body.resting, scene.body.loose, scene.probe.jaw
+    return bool(terms_of(scene)) or any(one is not None for one in touched)
 
 
 def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_: True, **how: Any) -> Feature:
@@ -181,6 +182,16 @@ def _of_capsule(key: str = "", has: Callable[[Capsule, Body], bool] = lambda *_:
 def _moves_surface(scene: Scene) -> bool:
     """Return whether the depth counts from the surface as loads leave it, and not from the undeformed one."""
     return is_loaded(scene) and (scene.probe.is_unilateral or _is_large(scene) or has_terms(scene))
+
+
+def _contact_of_layer(scene: Scene) -> tuple[str, Any] | None:
+    loose = scene.body.loose
+    return None if loose is None else (f"body.layer[{loose.number + 1}].contact", "unilateral")
+
+
+def _friction_of_layer(scene: Scene) -> tuple[str, Any] | None:
+    loose = scene.body.loose
+    return None if loose is None else (f"body.layer[{loose.number + 1}].friction", loose.friction)
 
 
 def _has_term(scene: Scene, name: str) -> bool:
@@ -313,6 +324,13 @@ FEATURES: dict[str, Feature] = {
     ),
     "prescribed footprint on a support that lets go": Feature(
         "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)
+    ),
+    "loose layer": Feature("body.layer", lambda s: s.body.loose is not None, where=_contact_of_layer),
+    "loose layer that rubs": Feature(
+        "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
+    ),
+    "prescribed footprint on a loose layer": Feature(
+        "probe.contact", lambda s: s.body.loose is not None and not s.probe.is_unilateral, ("body",)
     ),
     "terms of loads": Feature("load", lambda s: bool(s.load.terms)),
     "capsule": _of_capsule(),

@@ -39,7 +39,7 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
-_WITH_TERMS = "with springs or other terms in [load], a capsule, a support that lets go, or two jaws"
+_WITH_TERMS = "with springs or other terms in [load], a capsule, a support that lets go, a loose layer, or two jaws"
 _NO_TERMS = "omit them"
 _TERMS: dict[str, type[BodyTerm]] = {**TERMS, "capsule": Capsule}
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
@@ -57,6 +57,7 @@ _NO_DERIVATIVES = {
 }
 
 _GRASPED = f"{NOT_CLOSED}: omit it, or `together`"
+_LOOSE = "is not computed where a layer is loose"
 _LIFTS = "is not computed where tissue may lift off its support: omit it, or [body.support]"
 
 REFUSALS: tuple[Refusal, ...] = (
@@ -288,6 +289,29 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("support that lets go", "time steps", f"{_IN_STEPS}, in which tissue lifts off no support: {_STATIC}"),
     *(Refusal(name, "support that lets go", _LIFTS) for name in ("influence", "spread")),
+    # A loose layer: its contact with the tissue below is found with that of the tool.
+    Refusal(
+        "prescribed footprint on a loose layer",
+        "loose layer",
+        'must be "unilateral" on a loose layer: its contact and that of the tool are found together',
+    ),
+    Refusal(
+        "loose layer",
+        "large displacements",
+        f"is not computed {_OF_LAW}: its nodes would leave those of the tissue below, on which they are. Omit it",
+    ),
+    Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
+    Refusal("loose layer", "grasp", "is not computed with two jaws: omit `together`"),
+    Refusal("loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
+    Refusal("loose layer", "accuracy", "has an edge of contact that meshes for an accuracy do not refine: give sizes"),
+    Refusal("loose layer", "region", "is parted in meshes of boxes and cylinders alone: use an inclusion, or omit it"),
+    Refusal("loose layer", "capsule on the surface", "would be held by the capsule around it: omit one of the two"),
+    *(
+        Refusal("loose layer that rubs", preloaded, f'must be 0 or "stick" with {what}')
+        for preloaded, what in (("loads", "loads"), ("tension of the capsule", "a capsule that is stretched before"))
+    ),
+    Refusal("loose layer", "time steps", f"is static, and {_IN_STEPS}: {_STATIC}"),
+    *(Refusal(name, "loose layer", f"{_LOOSE}: omit it, or the layer's contact") for name in ("influence", "spread")),
     # Two jaws: the contact of the second one is found with that of the tool.
     Refusal(
         "prescribed footprint of a grasp",

@@ -1,0 +1,167 @@
+"""Candidates among the dofs of a space, and pairs of nodes where two surfaces of tissue touch."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.spatial import cKDTree
+
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from epsmesh.solve import SolveError
+from epsmesh.solve.compiled import global_sum
+from epsmesh.solve.contact.surface import Candidates
+
+# Nodes of both surfaces are at the same place within this share of the surface's extent.
+_SAME = 1e-7
+
+
+class Numbering:
+    """Positions of the candidates among the local dofs of a space, and transfer of values from there to all ranks.
+
+    ``numbers`` (n) are global, ``local`` (n) the blocks of this rank, −1 where it has none; ``is_owned`` (n) are those
+    that it owns.
+    """
+
+    def __init__(self, space: Any, numbers: IntArray):
+        """Find nodes with global ``numbers`` (n) in ``space``."""
+        index_map = space.dofmap.index_map
+        self.comm: MPI.Comm = space.mesh.comm
+        self.owned: int = index_map.size_local
+        local = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        known = np.asarray(index_map.local_to_global(local), dtype=np.int64)
+        order = np.argsort(known)
+        place = np.searchsorted(known, numbers, sorter=order)
+        at = np.append(order, -1)[place]
+        self.local = np.where(np.append(known, -2)[at] == numbers, at, -1)
+        self.numbers, self.is_owned = numbers, (self.local >= 0) & (self.local < index_map.size_local)
+
+    def normal_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
+        """Return the local dofs (unrolled) along z of the ``chosen`` (n): all on this rank, or owned ones only."""
+        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
+        return np.sort(3 * self.local[here] + 2).astype(np.int32)
+
+    def all_dofs(self, chosen: BoolArray, *, owned: bool = False) -> Int32Array:
+        """Return the local dofs of the ``chosen`` (n) along all axes."""
+        here = chosen & self.is_owned if owned else chosen & (self.local >= 0)
+        return np.sort((3 * self.local[here][:, None] + np.arange(3)).ravel()).astype(np.int32)
+
+    def put(self, into: FloatArray, values: FloatArray, chosen: BoolArray) -> None:
+        """Write ``values`` (n) of the ``chosen`` (n) along z into an array of owned dofs (unrolled)."""
+        here = chosen & self.is_owned
+        into[3 * self.local[here] + 2] = values[here]
+
+    def gather(self, values: FloatArray) -> FloatArray:
+        """Return the entries along z, (n), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros(len(self.local))
+        found[self.is_owned] = values[3 * self.local[self.is_owned] + 2]
+        return global_sum(self.comm, found)
+
+    def gather_vectors(self, values: FloatArray) -> FloatArray:
+        """Return all entries, (n, 3), of ``values`` on owned dofs (unrolled), on every rank; collective."""
+        found = np.zeros((len(self.local), 3))
+        found[self.is_owned] = values.reshape(-1, 3)[self.local[self.is_owned]]
+        return global_sum(self.comm, found)
+
+    def put_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Write ``values`` (n, 3) into an array that begins with the owned dofs (unrolled)."""
+        into[self._unrolled] = values[self.is_owned]
+
+    def add_vectors(self, into: FloatArray, values: FloatArray) -> None:
+        """Add ``values`` (n, 3) to such an array."""
+        into[self._unrolled] += values[self.is_owned]
+
+    @cached_property
+    def _unrolled(self) -> Int32Array:
+        return np.asarray(3 * self.local[self.is_owned][:, None] + np.arange(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """Pairs of nodes of two surfaces of tissue that touch: ``upper`` and ``lower`` ones, n each, at the same places.
+
+    Contact holds the displacement w of an upper node relative to its lower one. Displacements are therefore written as
+    u = S v, in which v has w at the upper nodes, and u elsewhere; forces follow by the transpose. ``free`` (n, 3) is 0
+    at prescribed components of upper nodes, else 1: there the lower one is prescribed, too. All methods change values
+    on owned dofs (unrolled), in any precision, and are collective. ``nodes`` (n) are the upper ones among the
+    candidates.
+    """
+
+    upper: Numbering
+    lower: Numbering
+    free: FloatArray
+    nodes: IntArray
+
+    def join(self, values: np.ndarray) -> None:
+        """Multiply by S: displacements from those relative to the lower nodes."""
+        self._add(self.lower, self.upper, values, 1.0)
+
+    def part(self, values: np.ndarray) -> None:
+        """Multiply by the inverse of S."""
+        self._add(self.lower, self.upper, values, -1.0)
+
+    def fold(self, values: np.ndarray) -> None:
+        """Multiply by the transpose of S: forces on upper nodes act on the lower ones, too."""
+        self._add(self.upper, self.lower, values, 1.0)
+
+    def unfold(self, values: np.ndarray) -> None:
+        """Multiply by the inverse of the transpose of S."""
+        self._add(self.upper, self.lower, values, -1.0)
+
+    def _add(self, here: Numbering, there: Numbering, values: np.ndarray, sign: float) -> None:
+        there.add_vectors(values, sign * self.free * here.gather_vectors(values[: 3 * here.owned]))
+
+    def fold_blocks(self, blocks: np.ndarray) -> None:
+        """Add the diagonal blocks (points, 9) of upper nodes to those of their lower ones."""
+        found = np.zeros((len(self.free), 9))
+        found[self.upper.is_owned] = blocks[self.upper.local[self.upper.is_owned]]
+        found = global_sum(self.upper.comm, found)
+        blocks[self.lower.local[self.lower.is_owned]] += found[self.lower.is_owned]
+
+    def matrix(self, like: PETSc.Mat) -> PETSc.Mat:
+        """Return S with the sizes of a matrix ``like``; the caller destroys it."""
+        (first, last), here = like.getOwnershipRange(), self.upper.is_owned
+        of_upper = (3 * self.upper.local[here][:, None] + np.arange(3)).ravel()
+        beside = np.full(last - first, -1)
+        beside[of_upper] = (3 * self.lower.numbers[here][:, None] + np.arange(3)).ravel()
+        weights = np.zeros(last - first)
+        weights[of_upper] = self.free[here].ravel()
+        both = np.column_stack([np.arange(first, last), beside]), np.column_stack([np.ones(last - first), weights])
+        used = both[0] >= 0
+        rows = np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(PETSc.IntType)
+        columns = both[0][used].astype(PETSc.IntType)
+        return PETSc.Mat().createAIJ(like.getSizes(), bsize=3, csr=(rows, columns, both[1][used]), comm=like.comm)
+
+    def react(self, into: FloatArray, forces: FloatArray) -> None:
+        """Add to nodal forces what the upper nodes exert on the lower ones if the ``forces`` of all
+        candidates (m, 3), N, act on them."""
+        self.lower.add_vectors(into, -forces[self.nodes])
+
+    def relative(self, moved: FloatArray, values: FloatArray) -> None:
+        """Make displacements of all candidates, ``moved``, relative to the lower nodes, with all ``values``."""
+        moved[self.nodes] -= self.free * self.lower.gather_vectors(values)
+
+
+def pairs_of(space: Any, below: Int32Array, candidates: Candidates, upper: IntArray, is_free: FloatArray) -> Pairs:
+    """Return the pairs of the ``upper`` candidates, by their numbers among all, and nodes of the facets ``below`` them.
+
+    ``is_free`` are 0 at prescribed dofs of the space, owned, else 1. Collective.
+
+    Raises:
+        SolveError: if a candidate has no node below it.
+    """
+    index_map, comm = space.dofmap.index_map, space.mesh.comm
+    here = np.asarray(fem.locate_dofs_topological(space, space.mesh.topology.dim - 1, below), dtype=np.int32)
+    here = here[here < index_map.size_local]
+    known = np.asarray(index_map.local_to_global(here), dtype=np.int64)
+    numbers = np.concatenate(comm.allgather(known))
+    places = np.concatenate(comm.allgather(np.asarray(space.tabulate_dof_coordinates())[here]))
+    points = candidates.points[upper]
+    away, nearest = cKDTree(places).query(points)
+    if len(np.unique(nearest)) < len(upper) or away.max(initial=0.0) > _SAME * float(np.ptp(points, axis=0).max()):
+        raise SolveError("the surfaces of a loose layer and of the tissue below it have different nodes")
+    of_upper = Numbering(space, candidates.numbers[upper])
+    return Pairs(of_upper, Numbering(space, numbers[nearest]), of_upper.gather_vectors(is_free), upper)
