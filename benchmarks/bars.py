@@ -1,26 +1,26 @@
 """Do error bars hold: random scenes of every feature of the program, on good and naive meshes, against finer solutions.
 
-    python -m benchmarks.bars [--seeds FIRST:END] [--minutes N] [--output FOLDER]
+    python -m benchmarks.bars [--only FEATURE ...] [--seeds FIRST:END] [--minutes N] [--output FOLDER]
 
-A scene is drawn from the table of features (:mod:`tests.pairs`), with other numbers and proportions; its seed gives
-the same scene each time. The finer solution is the program's own with an accuracy of a tenth of the bar, on the
-meridian where there is one, else on smaller elements of degree 3. Rows go to NAME.jsonl, where a later call goes on.
+Scenes, and what is solved as their truth, are those of :mod:`benchmarks.drawn`; a seed gives the same scene each time.
+With ``--only``, each has one of these features: ``--only grasp pull "support that lets go"``. Rows go to NAME.jsonl,
+where a later call goes on.
 """
 
 import copy
 import itertools
 import json
 import math
-import random
 import resource
 import sys
 import tempfile
 import time
 import tomllib
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any, Protocol
@@ -28,32 +28,22 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.stats import binomtest
 
+from benchmarks.drawn import Drawn, more_steps, scene, truths
 from benchmarks.tables import markdown, options, write
-from epsmesh.plan.plan import make_plan
-from epsmesh.plan.steps import Solve
-from epsmesh.study.read import read_mapping
 from tests.isolated import isolated
 from tests.pairs import FEATURES, Study, tools
 from tests.same.outcome import Outcome, solve
-from tests.same.quantities import rewritten, times
-from tests.same.scenes import draw, seconds, write_files
+from tests.same.scenes import seconds, write_files
 
 SEEDS = tomllib.loads((Path(__file__).parent / "seeds.toml").read_text(encoding="utf-8"))
 # Limits: coverage of a class of this many scenes, and of all of them.
 HELD, ALL_HELD, ENOUGH = 0.95, 0.97, 40
-# Size of elements at the edge: from a fifth of that of the base study to three times, 3/4 of the tool's half width.
-_RIM, _NAIVE = (0.15, 3.0), 1.4
-_IN_3D = 0.7  # share of round scenes solved in three dimensions, whose truth is on the meridian
-# The truth's accuracy, in bars, and its limits; its own bar may be this share of the scene's at most.
-_FINER, _ACCURACIES, _KNOWN = 10, (0.001, 0.02), 1 / 3
-_SHORT, _LONG = 8.0, 60.0  # seconds that a scene and its truth may take, as planned
+_KNOWN = 1 / 3  # the truth's own bar may be this share of the scene's at most
+_LONG = 60.0  # seconds that the truth may take, as planned
 _LIMIT = 60  # seconds of the processor after which a scene is given up
 _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
 
-
 Values = dict[str, float]
-# What draws the scene of a seed: its study, whose files are in a folder, and its classes.
-Drawn = Callable[[int, Path], tuple[Study, dict[str, str]]]
 
 
 class Look(AbstractContextManager[Any], Protocol):
@@ -84,66 +74,6 @@ class Row:
     def main(self) -> str:
         """The quantity that the scene is about: the depth where the force is given."""
         return "depth" if "depth" in self.errors else "force"
-
-
-def scene(seed: int, folder: Path) -> tuple[Study, dict[str, str]]:
-    """Return the study of a seed, and its classes; ``folder`` has the files of studies."""
-    dice = random.Random(f"bars {seed}")
-    drawn, names = draw(seed, folder, fine=dice.random() < 0.25)
-    slots = {feature.slot: feature.name for feature in FEATURES if feature.name in names}
-    study = _other_proportions(drawn, dice, folder)
-    mesh, sizes = study["mesh"], "asked"
-    if "accuracy" not in mesh:
-        factor = math.exp(dice.uniform(*map(math.log, _RIM)))
-        sizes = "naive" if factor > _NAIVE else "graded"
-        for changes in ({"rim": times(mesh["rim"], round(factor, 2)), "degree": dice.choice((1, 2, 2, 3))}, {}):
-            if "degree" in slots:
-                changes.pop("degree", None)
-            study["mesh"] = mesh | changes
-            if seconds(study, folder) <= _SHORT:
-                break
-        else:
-            sizes = "as drawn"
-    solve = _first_solve(study, folder)
-    if solve.axisymmetric and dice.random() < _IN_3D:
-        other = study | {"mesh": study["mesh"] | {"model": "3d"}}
-        if seconds(other, folder) <= _SHORT:
-            study, solve = other, _first_solve(other, folder)
-    slots["dimension"] = solve.way.dimension.value
-    return study, slots | {"mesh": sizes, "order": str(solve.case.mesh.degree), "element": solve.way.element}
-
-
-def _first_solve(study: Study, folder: Path) -> Solve:
-    return make_plan(read_mapping(study, "bars", folder)).solves[0]
-
-
-def _other_proportions(study: Study, dice: random.Random, folder: Path) -> Study:
-    """Return the study with each length of tool and body times a number of its own, if it remains one."""
-
-    def write(number: float, unit: str, kind: str) -> str:
-        return f"{number * (dice.uniform(0.7, 1.4) if kind == 'length' else 1):.4g} {unit}"
-
-    has_files = study["body"]["shape"] in ("cad", "surface", "image") or "file" in study["material"]["young"]
-    for parts in (("body", "probe"), ("probe",)):
-        changed = study | {part: rewritten({part: study[part]}, write)[part] for part in parts}
-        if not (has_files and "body" in parts) and seconds(changed, folder) <= _SHORT:
-            return changed
-    return study
-
-
-def truths(study: Study, bar: float) -> Iterator[Study]:
-    """Yield studies of a scene's truth, whose relative bar is ``bar``: what is tried first comes first."""
-    mesh = study["mesh"]
-    whole = mesh.get("outside", "coarse") == "coarse"
-    kept = {key: mesh[key] for key in ("epsilon", "outside") if key in mesh and not whole}
-    low, high = _ACCURACIES
-    # The cost of friction in three dimensions grows with the cube of the nodes in contact.
-    for finer in (_FINER, _FINER / 2) if tools(study)[0].get("friction") is None else (4,):
-        yield study | {"mesh": {"accuracy": f"{100 * min(max(bar / finer, low), high):.3g} %"} | kept}
-    if "rim" in mesh:
-        sizes = {key: times(mesh[key], factor) for key, factor in {"rim": 0.2, "fine": 0.5, "coarse": 0.6}.items()}
-        for degree in (3, 2):
-            yield study | {"mesh": mesh | sizes | {"growth": 0.5, "degree": degree}}
 
 
 def judged(
@@ -190,7 +120,8 @@ def truth_of(
     for finer in finer_than(study, relative_bar(found, name)):
         if seconds(finer, folder) > longest:
             continue
-        truth = solve(copy.deepcopy(finer), folder)
+        with more_steps(finer):
+            truth = solve(copy.deepcopy(finer), folder)
         if not truth.is_taken:
             reason = f"its truth {truth.kind}: {' '.join(truth.message.split())[:200]}"
         elif compared(found, truth)[1].get(name, math.inf) <= _KNOWN:
@@ -233,7 +164,8 @@ def compared(found: Outcome, truth: Outcome) -> tuple[Values, Values]:
         if np.isfinite(off[worst]):
             errors[name], known[name] = float(off[worst]), float(of_truth) if np.isfinite(of_truth) else math.inf
     # Where the force is given, it is no result.
-    return {k: v for k, v in errors.items() if not ("depth" in errors and k.startswith("force"))}, known
+    given = ("force", "closed_force") if "depth" in errors else ()
+    return {name: error for name, error in errors.items() if not name.startswith(given)}, known
 
 
 def table(rows: Iterable[Row]) -> list[dict[str, Any]]:
@@ -336,17 +268,24 @@ def campaign(
     told: Callable[[list[Row]], str],
     judge: Callable[[int, Path, Drawn], Row] = judged,
     count: int = 1000,
+    choices: Collection[str] = (),
 ) -> list[Row]:
     """Run the scenes that the options in ``arguments`` name, write and print what is ``told`` of them, return the rows.
 
     Without the option they are ``count`` of the test. The log is NAME-KIND.jsonl, where KIND says what the seeds are
-    for; a later call goes on there.
+    for; a later call goes on there. With ``choices``, an option draws the scenes of some of these features alone, in a
+    log of their own.
     """
     parser = options(about)
     first, _ = SEEDS["test"]
+    if choices:
+        parser.add_argument("--only", nargs="+", choices=choices, default=[], metavar="FEATURE", help="of scenes")
     parser.add_argument("--seeds", default=f"{first}:{first + count}", help="FIRST:END")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after this time; a later call goes on")
     asked = parser.parse_args(arguments)
+    if choices and asked.only:
+        drawn = partial(scene, only=tuple(asked.only))
+        name = "-".join([name, *(feature.replace(" ", "_") for feature in asked.only)])
     first, end = map(int, asked.seeds.split(":"))
     kind = next((name for name, (low, high) in SEEDS.items() if low <= first < end <= high), "sealed")
     log = asked.output / f"{name}-{kind}.jsonl"
@@ -359,7 +298,8 @@ def campaign(
 
 def main(arguments: list[str]) -> int:
     """Run, write, and return the exit status: 1 if bars do not hold."""
-    return status(campaign(arguments, __doc__, "bars", scene, report))
+    features = [feature.name for feature in FEATURES]
+    return status(campaign(arguments, __doc__, "bars", scene, report, choices=features))
 
 
 def status(rows: list[Row]) -> int:

@@ -17,7 +17,8 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.bars import Row, campaign, scene
+from benchmarks.bars import Row, campaign
+from benchmarks.drawn import scene
 from benchmarks.tables import markdown
 from epsmesh.run.record import UNFORESEEN
 from tests.pairs import Study, pieces, tools

@@ -22,7 +22,8 @@ from typing import Any, Self, get_type_hints
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.bars import SEEDS, Drawn, Row, judged, resumed, scene, truths
+from benchmarks.bars import SEEDS, Row, judged, resumed
+from benchmarks.drawn import Drawn, scene, truths
 from benchmarks.families import FAMILIES
 from benchmarks.tables import markdown, options, write
 from epsmesh import fitted

@@ -32,7 +32,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.bars import Drawn, Row, campaign, interval, limit_processor, relative_bar, scene, truth_of
+from benchmarks.bars import Row, campaign, interval, limit_processor, relative_bar, truth_of
+from benchmarks.drawn import Drawn, scene
 from benchmarks.grids import Estimate, grid_convergence_index, median_interval
 from benchmarks.tables import markdown, options
 from epsmesh.study.read import read_mapping

@@ -18,8 +18,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from benchmarks.bars import Drawn, Row, campaign, limit_processor, relative_bar, status
+from benchmarks.bars import Row, campaign, limit_processor, relative_bar, status
 from benchmarks.bars import report as told_of
+from benchmarks.drawn import Drawn
 from benchmarks.peers.processes import PEERS_PYTHON
 from benchmarks.processor import ROOT
 from tests.pairs import Study

@@ -4,14 +4,20 @@ import hashlib
 import json
 import math
 
+import numpy as np
 import pytest
 
 from benchmarks import bars
-from benchmarks.bars import HELD, Row, interval, report, scene, table, truths
+from benchmarks.bars import HELD, Row, compared, interval, report, table
+from benchmarks.drawn import has_two_contacts, more_steps, scene, truths
+from epsmesh.solve.contact import large
+from tests.pairs import BASE
 from tests.physics import hashes
+from tests.same.outcome import Outcome, Value
 from tests.same.scenes import seconds, write_files
 
 SAMPLE = 40
+CONTACTS = ("grasp", "pull", "support that lets go")
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +38,39 @@ def test_a_seed_is_a_scene_and_has_a_finer_one(folder):
         study, classes = scene(seed, folder)
         assert math.isfinite(seconds(study, folder)) and {"mesh", "order", "element"} <= classes.keys()
         assert any(math.isfinite(seconds(finer, folder)) for finer in truths(study, 0.02))
+
+
+@pytest.mark.nightly
+def test_scenes_of_some_features_have_one_of_them_and_differ_in_more_than_that(folder):
+    drawn = [scene(seed, folder, CONTACTS) for seed in range(3, 15)]
+    assert scene(3, folder, CONTACTS) == drawn[0]
+    for study, classes in drawn:
+        assert has_two_contacts(study)
+        assert classes.get("grasp", classes.get("support")) in CONTACTS
+        assert any(math.isfinite(seconds(finer, folder)) for finer in truths(study, 0.02))
+    assert {classes["friction"] for _, classes in drawn} == {"none", "some", "stick"}
+    assert {"equal", "different"} <= {classes.get("jaws") for _, classes in drawn}
+
+
+def test_the_truth_of_two_contacts_is_followed_in_more_steps():
+    def steps():
+        return large.LargeContact.STEPS, large.PULL_STEPS
+
+    usual = steps()
+    with more_steps(BASE):
+        assert steps() == usual
+    with more_steps(BASE | {"probe": [BASE["probe"] | {"together": "grasp"}, {"together": "grasp"}]}):
+        assert steps() == tuple(2 * count for count in usual)
+    assert steps() == usual
+
+
+def test_a_force_that_is_given_is_no_result():
+    def outcome(depth):
+        values = {"force": 1.0, "closed_force": 1.0, "pull_force": depth, "depth": depth}
+        return Outcome("taken", "", {name: Value(np.array(one), "", np.array(0.1)) for name, one in values.items()})
+
+    errors, _ = compared(outcome(1.0), outcome(1.05))
+    assert errors == pytest.approx({"pull_force": 0.5, "depth": 0.5})
 
 
 def test_a_class_is_not_outvoted_by_the_others():
@@ -59,6 +98,15 @@ def test_a_scene_is_judged_and_a_campaign_goes_on(tmp_path, capsys):
     assert bars.main([*words, "8:9"]) == 0
     assert len(log.read_text().splitlines()) == 1
     assert "| all | 1 | 1 |" in capsys.readouterr().out
+
+
+@pytest.mark.nightly
+def test_a_campaign_of_some_features_has_a_log_of_its_own(tmp_path):
+    words = ["--output", str(tmp_path), "--seeds", "7:8", "--only", "support that lets go"]
+    assert bars.main(words) in (0, 1)
+    (log,) = tmp_path.glob("*.jsonl")
+    assert log.name == "bars-support_that_lets_go-calibration.jsonl"
+    assert json.loads(log.read_text())["classes"]["support"] == "support that lets go"
 
 
 @pytest.mark.nightly

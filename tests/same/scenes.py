@@ -2,7 +2,7 @@
 
 import copy
 import random
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from math import inf
 from pathlib import Path
 
@@ -39,19 +39,26 @@ _ROUND = 0.7
 
 
 def draw(
-    seed: int, folder: Path, *, fine: bool = False, without: Collection[str] = ()
+    seed: int,
+    folder: Path,
+    *,
+    fine: bool = False,
+    without: Collection[str] = (),
+    only: Collection[str] = (),
+    longest: Sequence[float] = (_SHORT, _SHORT, _SHORT, _LONG),
 ) -> tuple[Study, tuple[str, ...]]:
     """Return the study of a seed, and the names of its features; the same seed gives the same study.
 
     ``folder`` has the files of :func:`write_files`. What the study's checks refuse is drawn again. ``fine`` scenes have
-    small elements, and many of them a meridian. Features ``without`` are not drawn.
+    small elements, and many of them a meridian. Features ``without`` are not drawn; one of ``only`` is, if there are
+    any. One of the times ``longest`` (s) is the most that the scene may take, as planned.
     """
     dice = random.Random(f"same {seed}")
-    longest = dice.choice((_SHORT, _SHORT, _SHORT, _LONG))
-    for features, study in _drawn(dice, _NO_SCENES | {*without}):
+    most = dice.choice(longest)
+    for features, study in _drawn(dice, _NO_SCENES | {*without}, tuple(only)):
         if fine:
             _refine(study, dice)
-        if seconds(study, folder) <= longest:
+        if seconds(study, folder) <= most:
             return study, tuple(feature.name for feature in features)
     raise AssertionError("the drawing does not end")
 
@@ -75,9 +82,11 @@ def seconds(study: Study, folder: Path) -> float:
         return inf
 
 
-def _drawn(dice: random.Random, without: Collection[str]) -> Iterator[tuple[tuple[Feature, ...], Study]]:
+def _drawn(
+    dice: random.Random, without: Collection[str], only: Sequence[str]
+) -> Iterator[tuple[tuple[Feature, ...], Study]]:
     while True:
-        features = _features(dice, without)
+        features = _features(dice, without, only)
         study = copy.deepcopy(BASE)
         study["material"].update(young=f"{dice.uniform(2, 60):.3g} kPa", poisson=dice.choice((0.3, 0.35, 0.42, 0.45)))
         study["probe"]["depth"] = f"{dice.uniform(0.1, 0.4):.2g} mm"
@@ -88,10 +97,17 @@ def _drawn(dice: random.Random, without: Collection[str]) -> Iterator[tuple[tupl
         yield features, study
 
 
-def _features(dice: random.Random, without: Collection[str]) -> tuple[Feature, ...]:
-    """Return some features of different slots, in the order in which their changes are made."""
+def _features(dice: random.Random, without: Collection[str], only: Sequence[str]) -> tuple[Feature, ...]:
+    """Return some features of different slots, in the order in which their changes are made; one of ``only``, if any.
+
+    They are so many besides that one.
+    """
     count = dice.choice(_FEATURES)
     chosen: dict[str, Feature] = {}
+    if only:
+        name = dice.choice(only)
+        chosen = {feature.slot: feature for feature in FEATURES if feature.name == name}
+        count += 1
     for feature in dice.sample(FEATURES, len(FEATURES)):
         if len(chosen) == count:
             break
