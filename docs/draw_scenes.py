@@ -33,6 +33,8 @@ ORDER = (
     "organ",
     "organ-tumour",
     "image",
+    "support",
+    "grasp",
 )
 # Bytes of a picture.
 MOST = 150_000

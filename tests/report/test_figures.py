@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from epsmesh.quantities import attributes
 from epsmesh.report.figures import KINDS, choose, draw, figure, lacks
 from epsmesh.report.figures.curves import positions
 from epsmesh.report.figures.facets import arrange, rest
@@ -238,6 +239,18 @@ def test_the_rest_holds_what_a_figure_leaves_out(tmp_path):
 def cells(data, dims, selection):
     """Return the combinations along ``dims`` that a selection holds."""
     return set(itertools.product(*([selection[dim]] if dim in selection else data[dim].values for dim in dims)))
+
+
+def test_the_figure_of_a_pull_has_the_force_along_it_and_of_the_second_jaw_what_differs():
+    """Jaws that nothing else helps to hold the body have one force."""
+    data = dataset(probe={"depth": ["0.1 mm", "0.2 mm", "0.3 mm"]})
+    names = {"jaw_force": 1.0, "pull_force": 0.3, "jaw_pull_force": 0.2, "lift_off_area": 0.0}
+    data = data.assign({name: share * data["force"] for name, share in names.items()})
+    data = data.assign({name: data[name].assign_attrs(attributes(name)) for name in names})
+    drawn = figure(data, "force")
+    labels = [" ".join(axes.get_ylabel().split()) for axes in drawn.axes]
+    assert labels[1:] == ["force along the pull, mN", "force along the pull on the second jaw, mN"]
+    np.testing.assert_allclose(drawn.axes[1].lines[0].get_ydata(), 1e3 * data["pull_force"].values.ravel())
 
 
 def test_what_is_left_out_is_shown_where_there_are_forces():

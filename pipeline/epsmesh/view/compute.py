@@ -17,15 +17,20 @@ from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.run.fields import moduli_of
 from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
+from epsmesh.run.problem import beds_on
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
+from epsmesh.scene.model import PROBE
 from epsmesh.shapes.section import in_mm
 from epsmesh.solve.cell_values import CellValues
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.points.state import State
 from epsmesh.view.fields import Fields
 from epsmesh.view.lagrange import nodes_of, stresses_of
+from epsmesh.view.pressure import pressures_of
 
 Note = Callable[[str], None]
+# Forces besides that of the tool.
+_BESIDES = ("jaw_force", "pull_force", "jaw_pull_force", "support_force")
 
 
 def compute_fields(
@@ -68,6 +73,9 @@ def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
     mirrors = solved.solve.mirrors
     nodes = nodes_of(solved.state, mirrors) if stress else None
     stresses = stresses_of(solved.state, mirrors) if stress else None
+    case, pressure = solved.solve.case, dict[str, FloatArray]()
+    if case.way.is_found:
+        pressure = pressures_of(solved.state, arrays, (PROBE, *beds_on(case)), mirrors)
     if arrays is None:
         return None
     fields = _whole(solved.solve, arrays, displacement, strain)
@@ -79,6 +87,10 @@ def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
         on_meridian=solved.on_meridian,
         nodes=nodes,
         stress=stresses,
+        pressure=pressure,
+        besides={
+            name: (record.largest[name], record.largest[f"{name}_error"]) for name in _BESIDES if name in record.largest
+        },
     )
 
 

@@ -1,6 +1,6 @@
 """What there is to see of one case: mesh, element sizes, displacement and strain as arrays of the whole body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import floor, inf, log10, nan
 
 import numpy as np
@@ -27,7 +27,9 @@ class Fields:
     bar ``force_error``; not a number where they were not asked for. ``on_meridian`` tells that it was found there.
     ``young`` (m,), Pa, is the modulus in the middle of each cell, where it varies within a region; otherwise None.
     ``nodes`` are those of the displacement's elements, in the order of the cells, and ``stress`` (m, 3, 3), Pa, is that
-    at the centre of each cell; None where they were not asked for.
+    at the centre of each cell; None where they were not asked for. ``pressure`` (k), Pa, is that of contact that was
+    found, in the middle of each triangle of a group of ``facets``. ``besides`` are the forces (N) of what touches the
+    body besides the tool, with their error bars, by their names in the dataset.
     """
 
     case: Case
@@ -46,6 +48,8 @@ class Fields:
     nodes: LagrangeNodes | None = None
     stress: FloatArray | None = None
     young: FloatArray | None = None
+    pressure: dict[str, FloatArray] = field(default_factory=dict)
+    besides: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def size(self) -> str:

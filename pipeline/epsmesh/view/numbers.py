@@ -39,8 +39,8 @@ def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
     ``points`` (3, n) in mm from the contact; ``cells`` (4, m), each number the difference to the corner before it, the
     first one's to the cell before; ``faces`` of the boundary, 4 × cell + the corner that it lies opposite to, each the
     difference to the one before, and their ``groups``; ``shift`` (3, n), displacements in units of :func:`shift_unit`;
-    ``regions``, ``sizes``, ``young`` and ``strains`` (m), the last three in 0 … 255 of the scale of their colours;
-    ``tool_points``, ``tool_moved`` (k, 3), mm, and ``tool_triangles``.
+    ``regions``, ``sizes``, ``young`` and ``strains`` (m), the last three in 0 … 255 of the scale of their colours, as
+    are ``pressures``, of the faces; ``tool_points``, ``tool_moved`` (k, 3), mm, and ``tool_triangles``.
     """
     sizes, (used, number) = fields.sizes, _along_curve(fields.points, fields.cells[:, :4])
     corners = np.sort(number[fields.cells[:, :4]], axis=1)
@@ -51,7 +51,7 @@ def mesh_arrays(fields: Fields) -> dict[str, npt.NDArray[Any]]:
     arrays: dict[str, npt.NDArray[Any]] = {
         "points": (_MM * (fields.points[used] - fields.contact)).T.astype("<f4"),
         "cells": np.vstack([np.diff(corners[:, 0], prepend=0), np.diff(corners, axis=1).T]).astype("<i4"),
-        **_faces(corners, {name: number[triangles] for name, triangles in fields.facets.items()}),
+        **_faces(corners, {name: number[facets] for name, facets in fields.facets.items()}, fields.pressure),
         "regions": regions[order].astype("u1" if regions.max(initial=0) < 256 else "i4"),
         "sizes": _steps(sizes, float(sizes.min()))[order],
         "tool_points": (_MM * (tool.points - fields.contact)).astype("<f4"),
@@ -85,6 +85,9 @@ def colours_of(fields: Fields) -> list[dict[str, Any]]:
     if (young := fields.young) is not None:
         low, high = _KPA * float(young.min()), _KPA * float(young.max())
         last = [_scale("Young's modulus", "kPa", low, high, VIRIDIS, array="young"), size]
+    if pressures := fields.pressure.values():
+        most = max(float(own.max(initial=0.0)) for own in pressures)
+        last = [_scale("contact pressure", "kPa", 0.0, _KPA * most, YLORRD, array="pressures", of_faces=True), *last]
     if fields.displacement is None or fields.strain is None:
         return [regions, *last]
     largest, worst = float(fields.magnitude.max()), 100 * float(fields.strain.max())
@@ -93,15 +96,18 @@ def colours_of(fields: Fields) -> list[dict[str, Any]]:
     return [regions, _scale("displacement", unit, 0.0, factor * largest, YLGNBU), strain, *last]
 
 
-def _scale(name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "") -> dict[str, Any]:
-    """Describe a scale of colours: logarithmic, of an array of the cells, or linear, of the displacement."""
+def _scale(
+    name: str, unit: str, low: float, high: float, stops: tuple[str, ...], array: str = "", *, of_faces: bool = False
+) -> dict[str, Any]:
+    """Describe a scale of colours: logarithmic, of an array of the cells, or linear, of the displacement or faces."""
     return {
         "name": name,
         "unit": unit,
         "limits": [low, high],
         "stops": list(stops),
         "array": array,
-        "linear": not array,
+        "linear": of_faces or not array,
+        "faces": of_faces,
     }
 
 
@@ -120,8 +126,12 @@ def _along_curve(points: FloatArray, corners: IntArray) -> tuple[IntArray, IntAr
     return used, number
 
 
-def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDArray[Any]]:
+def _faces(
+    corners: IntArray, facets: dict[str, IntArray], pressure: dict[str, FloatArray]
+) -> dict[str, npt.NDArray[Any]]:
     """Find the boundary's triangles ``facets`` among the faces of cells, by their ``corners`` (m, 4).
+
+    Some groups of them have a contact ``pressure`` (Pa).
 
     Raises:
         ValueError: if a triangle is the face of no cell.
@@ -136,10 +146,14 @@ def _faces(corners: IntArray, facets: dict[str, IntArray]) -> dict[str, npt.NDAr
         raise ValueError(f"{len(known) - len(found)} triangles of the boundary are the face of no cell")
     codes = near[place]
     order = np.argsort(codes)
-    return {
+    arrays = {
         "faces": np.diff(codes[order], prepend=0).astype("<i4"),
         "groups": groups[found[order]].astype("u1"),
     }
+    if pressure:
+        values = np.concatenate([pressure.get(name, np.zeros(len(facet))) for name, facet in facets.items()])
+        arrays["pressures"] = np.round(255 * values / (values.max() or 1.0)).astype("u1")[found[order]]
+    return arrays
 
 
 def keys_of(triples: IntArray) -> IntArray:

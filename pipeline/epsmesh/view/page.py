@@ -9,11 +9,14 @@ import numpy.typing as npt
 
 from epsmesh.files import write_whole
 from epsmesh.pages import compressed, hash_of, joined, json_in_page, layout, packed, render_page
-from epsmesh.quantities import readable
+from epsmesh.quantities import QUANTITIES, readable
 from epsmesh.report.words import barred
+from epsmesh.shapes.support import NONE
+from epsmesh.study.case import Case
 from epsmesh.view import palette
 from epsmesh.view.fields import Fields
 from epsmesh.view.numbers import colours_of, mesh_arrays, shift_unit
+from epsmesh.view.tool import tool_of
 from epsmesh.view.viewpoint import Viewpoint
 
 SCENE = Path(__file__).parent / "templates"
@@ -77,14 +80,21 @@ def _facts(fields: Fields) -> list[str]:
         factor, unit = readable("force")
         force = barred(factor * fields.force, factor * abs(fields.force) * fields.force_error, unit)
         facts.append(f"{of}F = {force}{where}")
+        facts += [
+            f"{QUANTITIES[name].symbol} = {barred(factor * value, factor * bar, unit)}"
+            for name, (value, bar) in fields.besides.items()
+        ]
     return [*facts, fields.size]
 
 
 def _inputs(fields: Fields) -> dict[str, Any]:
     """Return what the script needs besides arrays and colours; lengths in mm, places relative to the contact."""
     view = Viewpoint.of(fields.case.frame, fields.planes)
-    low, high = (_MM * (end(fields.points, axis=0) - fields.contact) for end in (np.min, np.max))
-    is_solved = fields.displacement is not None
+    case, is_solved = fields.case, fields.displacement is not None
+    # What is below the body is seen, too: the second jaw of a grasp, or the plane of a support.
+    alone = case.jaw is None and case.body.resting is None
+    seen = fields.points if alone else np.vstack([fields.points, tool_of(fields).points])
+    low, high = (_MM * (end(seen, axis=0) - fields.contact) for end in (np.min, np.max))
     return {
         "colours": colours_of(fields),
         "shift": _MM * shift_unit(fields),
@@ -102,4 +112,13 @@ def _inputs(fields: Fields) -> dict[str, Any]:
         "start": fields.drawn_factor if is_solved else 0,
         "keeps_depth": not fields.case.probe.is_flat,
         "outline": [(_MM * (line - fields.contact)).round(4).tolist() for line in fields.outline],
+        "touching": "jaws" if case.jaw is not None else "tool and support" if case.body.resting is not None else "tool",
+        "held": _held(case),
     }
+
+
+def _held(case: Case) -> str:
+    """Return what is said of the part that holds the body, "" if there is none."""
+    if case.body.resting is not None:
+        return "on the support"
+    return "" if case.body.fixed == NONE else "fixed"

@@ -1,4 +1,4 @@
-"""The tool as triangles, for pictures and pages."""
+"""The tool as triangles, for pictures and pages, with what touches the body besides: a second jaw, a support."""
 
 from dataclasses import dataclass
 
@@ -19,6 +19,8 @@ _LINES, _POINTS = 49, 60
 _ROUND, _ACROSS = 4.0, 1.5
 # Bisections of a line for the point at a height.
 _HALVINGS = 40
+# How far the plane of a support is drawn beyond the body, and below it, in extents of the body.
+_BEYOND, _BELOW = 0.08, 1e-4
 
 
 @dataclass(frozen=True)
@@ -31,29 +33,50 @@ class Tool:
 
 
 def tool_of(fields: Fields) -> Tool:
-    """Return the tool of a case, and the second jaw of a grasp."""
+    """Return the tool of a case, the second jaw of a grasp, and the plane of a support that lets go."""
     case = fields.case
-    tool = _tool(fields, case.probe, PROBE)
-    if case.jaw is None:
-        return tool
-    jaw = _tool(fields, case.jaw, JAW)
-    triangles = np.vstack([tool.triangles, jaw.triangles + len(tool.points)])
-    return Tool(np.vstack([tool.points, jaw.points]), triangles, np.vstack([tool.moved, jaw.moved]))
+    parts = [_tool(fields, case.probe, PROBE)]
+    if case.jaw is not None:
+        parts.append(_tool(fields, case.jaw, JAW))
+    if case.body.resting is not None:
+        parts.append(_plane_below(fields))
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    return Tool(
+        points=np.vstack([part.points for part in parts]),
+        triangles=np.vstack([part.triangles + offset for part, offset in zip(parts, first, strict=False)]),
+        moved=np.vstack([part.moved for part in parts]),
+    )
+
+
+def _plane_below(fields: Fields) -> Tool:
+    """Return the rigid plane on which the body rests, a bit below it: a part that reaches beyond the body."""
+    low, high = fields.points.min(axis=0), fields.points.max(axis=0)
+    extent = float(np.linalg.norm(high - low))
+    x, y = (np.array([low[axis], high[axis]]) + _BEYOND * extent * np.array([-1, 1]) for axis in (0, 1))
+    height, _ = fields.case.body.heights
+    points = np.array([(x[i], y[j], height - _BELOW * extent) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    return Tool(points, np.array([[0, 1, 2], [0, 2, 3]]), np.zeros_like(points))
 
 
 def _tool(fields: Fields, probe: Probe, group: str) -> Tool:
-    """Return a tool: its footprint, extruded, with the displacement of its ``group``; or its own surface."""
+    """Return a tool: its footprint, extruded, with the displacement of its ``group``; or its own surface.
+
+    Where contact is found, the tissue below the footprint does not show how far the tool goes.
+    """
     body, frame = fields.case.body, probe.frame_on(fields.case.body)
     length, outward = _LENGTH * probe.circumradius, np.array(frame.outward)
+    travel = np.add(probe.travel(frame), fields.case.probe.pulled or 0.0)
     if not probe.is_flat:
         lines = _lines(probe, length)
         # The depth counts from where the tool first touches, which may be beside its axis.
         *_, first = first_touch(body, probe, frame)
         points = frame.world(lines.reshape(-1, 3)) - first * outward
-        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(probe.travel(frame), (len(points), 1)))
+        return Tool(points, _between_lines(*lines.shape[:2]), np.tile(travel, (len(points), 1)))
     used, corners = np.unique(fields.facets[group], return_inverse=True)
     base, below = fields.points[used], corners.reshape(-1, 3)
-    moved = np.zeros_like(base) if fields.displacement is None else fields.displacement[used]
+    moved = np.zeros_like(base)
+    if fields.displacement is not None:
+        moved = np.tile(travel, (len(base), 1)) if fields.case.way.is_found else fields.displacement[used]
     count, (first, second) = len(used), _rim(below).T
     sides = np.column_stack([first, second, first + count]), np.column_stack([first + count, second + count, second])
     return Tool(

@@ -34,8 +34,13 @@ _COSTS = ("dofs", "time_total")
 _BARS = "bars are 95\N{NO-BREAK SPACE}% error bars."
 _MOST_PANELS, _MOST_CURVES = 4, 4
 _PANEL, _LEGEND_LINE, _LETTERS = 2.9, 0.17, 34  # inches: of a panel with its legend above, and of a line of that
-# What is drawn below the force where a study has it; those that are shares of something have a line at 1.
-_WITH_FORCE = ("contact_area", "load_force", "sag", "linear_ratio", "force_exact_ratio")
+# What is drawn below the force where a study has it; those that are shares of something have a line at 1. What a
+# second jaw has is drawn where it differs from what the first has by more than this share.
+_OF_JAW, _DIFFERS = "jaw_", 1e-3
+_WITH_FORCE = (
+    *("pull_force", "jaw_force", "jaw_pull_force", "contact_area", "jaw_contact_area", "lift_off_area"),
+    *("load_force", "sag", "linear_ratio", "force_exact_ratio"),
+)
 _SHARES = ("linear_ratio", "force_exact_ratio")
 _NOUGHT = {"sag": 1e-9}  # m: what the solver leaves of none
 # What is drawn below the force over time, and what is a curve first.
@@ -242,6 +247,9 @@ def _varies(dataset: xr.Dataset, name: str) -> bool:
     """Tell whether ``dataset`` has values of a quantity, other than nought."""
     if name not in dataset or (name == "linear_ratio" and "law" not in dataset.dims):
         return False
+    if name.startswith(_OF_JAW):
+        own, of_first = dataset[name], dataset[name.removeprefix(_OF_JAW)]
+        return bool((abs(own - of_first) > _DIFFERS * abs(of_first).max()).any())
     return bool((abs(dataset[name]) > _NOUGHT.get(name, 0.0)).any())
 
 

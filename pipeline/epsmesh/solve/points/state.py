@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.scene.model import PROBE
@@ -34,7 +34,7 @@ class Values:
     """Values at n points; NaN where a point is outside the body. Global, equal on every rank.
 
     ``displacement`` (n, 3), m; ``gradient`` (n, 3, 3) of it; ``stress`` (n, 3, 3), Pa: Cauchy's; ``contact`` (n), Pa,
-    the pressure −n·σ·n on the tool's footprint, NaN elsewhere; ``region`` (n), -1 outside.
+    the pressure −n·σ·n on the surfaces that are touched, NaN elsewhere; ``region`` (n), -1 outside.
     """
 
     displacement: FloatArray
@@ -66,7 +66,8 @@ class State:
     elements, λ₁ times the change of volume, and None in displacement elements. The body may be the half or quarter that
     planes of symmetry leave. ``influence`` is known if it was requested: see :mod:`epsmesh.solve.influence`.
     ``factors`` (cells, 4) are those of the energy at the corners of local cells, None where they are 1: stresses, and
-    the pressure, are to be multiplied by them.
+    the pressure, are to be multiplied by them. ``touched`` are the groups of facets with a contact pressure: the tool's
+    footprint, unless others are asked for.
     """
 
     body: BodyMesh
@@ -75,6 +76,7 @@ class State:
     law: MaterialLaw
     influence: Influence | None = None
     factors: FloatArray | None = None
+    touched: tuple[str, ...] = (PROBE,)
 
     @property
     def degree(self) -> int:
@@ -169,7 +171,7 @@ class State:
             stress *= self._factors_at(cells, at)[:, None, None]
         found[here, :3] = np.einsum("nk,nki->ni", table[0], values)
         found[here, 3:12], found[here, 12:21] = gradient.reshape(-1, 9), stress.reshape(-1, 9)
-        facet = self._on_footprint(cells, at)
+        facet = self._on_touched(cells, at)
         normal = _normals(facet, jacobian if self.law.is_linear else (np.eye(3) + gradient) @ jacobian)
         found[here, 21] = facet >= 0
         found[here, 22] = np.where(facet >= 0, -np.einsum("ni,nij,nj->n", normal, stress, normal), 0.0)
@@ -257,21 +259,22 @@ class State:
         evaluate.kernel = point.kernel  # type: ignore[attr-defined]  # keeps the code in memory
         return evaluate
 
-    # ---- the tool's footprint --------------------------------------------------------------------------
+    # ---- surfaces that are touched ---------------------------------------------------------------------
 
     @cached_property
-    def _facets(self) -> Int32Array:
-        """Whether each facet of each owned cell, opposite to a corner, is in the footprint, (cells, 4)."""
+    def touched_facets(self) -> BoolArray:
+        """Whether each facet of each owned cell, opposite to a corner, is on a surface that is touched, (cells, 4)."""
         topology = self.body.mesh.topology
         tdim = topology.dim
         topology.create_connectivity(tdim, tdim - 1)
         of_cell = topology.connectivity(tdim, tdim - 1).array.reshape(-1, tdim + 1)[: self.body.owned_cells]
-        return np.isin(of_cell, self.body.facets.get(PROBE, np.empty(0, np.int32))).astype(np.int32)
+        groups = [self.body.facets.get(name, np.empty(0, np.int32)) for name in self.touched]
+        return np.isin(of_cell, np.concatenate(groups))
 
-    def _on_footprint(self, cells: IntArray, at: FloatArray) -> IntArray:
-        """Return the local number of the facet of the footprint that each point is on, -1 if it is on none."""
+    def _on_touched(self, cells: IntArray, at: FloatArray) -> IntArray:
+        """Return the local number of the facet that is touched on which each point is, -1 if it is on none."""
         weights = np.column_stack([1 - at.sum(axis=1), at])
-        on = (self._facets[cells] == 1) & (np.abs(weights) <= INSIDE)
+        on = self.touched_facets[cells] & (np.abs(weights) <= INSIDE)
         return np.where(on.any(axis=1), on.argmax(axis=1), -1)
 
 

@@ -98,6 +98,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "varying stiffness": "{key}: a scene of SOFA has one modulus for each region",
         "relaxation": "material.relaxation: a scene of SOFA is static",
         "loads": "[load]: a scene of SOFA has the tool's force alone",
+        "grasp": "probe.together: a scene of SOFA has one tool",
         "terms": "[load], body.capsule, body.support: a scene of SOFA has the tool's force and the tissue alone",
         "half ball": 'mesh.epsilon: the far field of a half ball has no counterpart in SOFA: use epsilon = "full"',
         "six motions": "probe.motion: a scene of SOFA has one motion",

@@ -29,9 +29,11 @@ class Mesh {
     for (let a = 0; a < n; a++) found[a] = x * points[a] + y * points[n + a] + z * points[2 * n + a];
     return found;
   }
-  // The value of a cell: the number of its region, or a share of the scale; undefined where points have values.
-  valueOf(cell, { array, labels }) {
+  // The value of a cell: the number of its region, or a share of the scale, none where faces have values; undefined
+  // where points have.
+  valueOf(cell, { array, labels, faces }) {
     if (!array) return undefined;
+    if (faces) return 0;
     return labels ? this.values[array][cell] : this.values[array][cell] / 255;
   }
   // Put a vertex on the edge from point a to point b, at the share t. Millions of them: no arrays are made here.
@@ -56,7 +58,7 @@ class Mesh {
     const made = new Vertices();
     for (let i = 0; i < faces.length; i++) {
       const cell = faces[i] >> 2;
-      const value = this.valueOf(cell, colour);
+      const value = colour.faces ? this.values[colour.array][i] / 255 : this.valueOf(cell, colour);
       for (let j = 0, corner = 0; j < 4; j++) {
         if (j === (faces[i] & 3)) continue;
         const a = cells[j * m + cell];

@@ -32,7 +32,10 @@ class Page {
     document.getElementById("deformed").hidden = !inputs.factor;
     Object.assign(field("deformation"), { max: inputs.factor, value: inputs.start });
     field("ring").parentElement.hidden = !inputs.epsilon;
-    document.querySelector(".ring + span").textContent = `ε = ${length(inputs.epsilon || 0)}`;
+    const words = { ring: `ε = ${length(inputs.epsilon || 0)}`, probe: inputs.touching, held: inputs.held };
+    words.footprint = inputs.touching === "jaws" ? "below the jaws" : "below the tool";
+    for (const [name, text] of Object.entries(words)) document.querySelector(`.${name} + span`).textContent = text;
+    document.querySelector("i.held").hidden = !inputs.held;
     for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = inputs.ink[name];
   }
   close() {
@@ -80,7 +83,9 @@ class Page {
     tool.material.uniforms.factor.value = this.inputs.keeps_depth ? Math.min(factor, 1) : factor;
     tool.visible = field("probe").checked;
     uniforms.epsilon.value = (field("ring").checked && this.inputs.epsilon) || 0;
-    for (const name of ["edges", "marks"]) uniforms[name].value = field(name).checked;
+    uniforms.edges.value = field("edges").checked;
+    // Marks are on the faces that pressures colour.
+    uniforms.marks.value = field("marks").checked && !this.colour.faces;
   }
 }
 
