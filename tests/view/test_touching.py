@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from epsmesh.run.solved import solve_alone
-from epsmesh.scene.model import FIXED, JAW, PROBE
+from epsmesh.scene.model import BELOW, FIXED, JAW, LOOSE, PROBE
 from epsmesh.study.read import parse
 from epsmesh.view.compute import compute_fields
 from epsmesh.view.numbers import FACES, mesh_arrays
@@ -16,6 +16,7 @@ from epsmesh.view.page import render
 from epsmesh.view.tool import tool_of
 from tests.cases import raw
 from tests.solve.test_grasp import BALL, grasp
+from tests.solve.test_loose import WEIGHT, flap
 from tests.solve.test_support import HEAVY, on
 
 WORLD = MPI.COMM_WORLD
@@ -136,3 +137,10 @@ def test_ranks_agree():
     alone = fields(content)
     for group, pressure in alone.pressure.items():
         np.testing.assert_allclose(together.pressure[group], pressure, rtol=1e-5, atol=1e-5 * pressure.max())
+
+
+def test_a_loose_layer_has_the_pressure_on_both_of_its_sides():
+    found = fields(raw(body=flap(0), probe=BALL, **HEAVY), bar=True)
+    for group in (LOOSE, BELOW):
+        assert resultant(found, group) == pytest.approx(WEIGHT + found.force, rel=0.05)
+    assert (mesh_arrays(found)["groups"] < 4).all()

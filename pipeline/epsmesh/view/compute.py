@@ -19,7 +19,7 @@ from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.problem import beds_on
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
-from epsmesh.scene.model import PROBE
+from epsmesh.scene.model import BELOW, PROBE
 from epsmesh.shapes.section import in_mm
 from epsmesh.solve.cell_values import CellValues
 from epsmesh.solve.compiled import vector_space
@@ -30,7 +30,7 @@ from epsmesh.view.pressure import pressures_of
 
 Note = Callable[[str], None]
 # Forces besides that of the tool.
-_BESIDES = ("jaw_force", "pull_force", "jaw_pull_force", "support_force")
+_BESIDES = ("jaw_force", "pull_force", "jaw_pull_force", "support_force", "interface_force")
 
 
 def compute_fields(
@@ -75,7 +75,8 @@ def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
     stresses = stresses_of(solved.state, mirrors) if stress else None
     case, pressure = solved.solve.case, dict[str, FloatArray]()
     if case.way.is_found:
-        pressure = pressures_of(solved.state, arrays, (PROBE, *beds_on(case)), mirrors)
+        other_side = (BELOW,) if case.body.loose else ()
+        pressure = pressures_of(solved.state, arrays, (PROBE, *beds_on(case), *other_side), mirrors)
     if arrays is None:
         return None
     fields = _whole(solved.solve, arrays, displacement, strain)
