@@ -157,6 +157,7 @@ def test_a_body_that_jaws_do_not_hold_fails_and_says_along_which_axis():
     ("content", "said"),
     [
         (grasp(DISC | {"contact": "bonded"}), "contacts of both jaws are found together"),
+        (grasp(BALL, DISC | {"contact": "bonded"}), 'probe[2].contact = "bonded": must be "unilateral" in a grasp'),
         (grasp(BALL, material={"density": "1000 kg/m^3"}, load=LIGHT), "before both jaws touch it"),
         (grasp(BALL, mesh=NO_SIZES | {"accuracy": "1 %"}), "give sizes"),
         (grasp(DISC | {"edge": "0.5 mm"}, {"edge": 0.0}, material=LARGE), "edge"),

@@ -99,6 +99,17 @@ def test_slip_that_another_pull_does_not_reach_has_no_known_bar():
     assert changed.force_bar == pytest.approx(0.6)
 
 
+def test_slip_that_only_some_of_the_pulls_reach_is_told():
+    slip = Slip(1e-3, 1e-4, 2.0, 0.1)
+    ends = PullResult((1.0, 1.0), slip, None, 0.0, 0.0, 0.0, 3.0)
+    slips = replace(ends, whole=slip)
+    assert ends.with_change(ends, ends).note == ""
+    for found in (ends.with_change(ends, slips), slips.with_change(ends, slips).with_change(slips, slips)):
+        assert "near to slip_whole" in found.note
+        assert "slip_begins" not in found.note
+        assert ContactResult(1e-6, pull=found).note == found.note
+
+
 def test_balls_slip_as_mindlin_computed(linear):
     """R. D. Mindlin, J. Appl. Mech. 16, 259, 1949: the pull at which the whole contact of a rigid ball slides."""
     modulus, poisson = 10e3 / 2.6, 0.3
@@ -130,8 +141,9 @@ def test_forces_are_proportional_to_the_modulus(stuck):
 def test_a_pull_along_any_direction_is_one_along_x(way, stuck):
     """A ball on a square box has no direction that it prefers."""
     found = pulled(STICKS | {"pull_direction": way})
-    assert found["pull_force"] == pytest.approx(stuck["pull_force"], rel=3e-2)
-    assert found["pull_work"] == pytest.approx(stuck["pull_work"], rel=3e-2)
+    # On this mesh bars are 25 %.
+    assert found["pull_force"] == pytest.approx(stuck["pull_force"], rel=5e-2)
+    assert found["pull_work"] == pytest.approx(stuck["pull_work"], rel=5e-2)
     assert abs(found["jaw_torque"]) < 1e-5 * found["pull_force"]  # N m: a hundredth of the contact radius
 
 
@@ -143,11 +155,11 @@ def test_a_case_without_a_pull_keeps_its_key():
 
 
 def test_the_dataset_has_the_force_against_the_pull():
-    plan = make_plan(parse(grasp(STICKS | {"pull": ["0.02 mm", "0.04 mm"]}, body=SIDES)))
+    plan = make_plan(parse(grasp(STICKS | {"pull": ["0.02 mm", "0.04 mm"]}, body=SIDES, mesh={"rim": "0.7 mm"})))
     found = build(plan, compute(plan, MPI.COMM_SELF))
     assert found["pull_force"].dims == ("pull",)
     small, large = found["pull_force"].values
-    assert large == pytest.approx(2 * small, rel=1e-5)  # nothing slides
+    assert large == pytest.approx(2 * small, rel=1e-5)  # nothing slides or leaves
     assert (found["pull_force_error"] > 0).all()
     assert found["slip_whole"].isnull().all()
 
@@ -185,7 +197,7 @@ def test_a_pull_that_leaves_its_contact_is_partial():
     assert "the pull reached" in found.message
     before = closed(BALL | {"friction": MU}, body=SIDES, material=LARGE)
     assert found.depth_reached == pytest.approx(0.3e-3)
-    assert found.force_reached == pytest.approx(before.force, rel=1e-3)
+    assert found.force_reached == pytest.approx(before.force, rel=3e-3)  # in half as many steps
 
 
 @pytest.mark.parametrize(

@@ -183,8 +183,8 @@ def _on_rim_nodes(mesh: MeshArrays, scene: Scene) -> MeshArrays:
         return mesh
     points = mesh.points.copy()
     moved = _lifted(scene, points[mesh.rim])
-    for plane in scene.mirrors:
-        axis = "xy".index(plane)
+    for plane in scene.cutting:
+        axis, _ = scene.plane(plane)
         on_plane = np.abs(points[mesh.rim, axis]) < _CLOSE * scene.body.extent
         moved[on_plane, axis] = points[mesh.rim, axis][on_plane]
     points[mesh.rim] = moved

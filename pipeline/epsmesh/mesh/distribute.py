@@ -14,6 +14,7 @@ from epsmesh.arrays import FloatArray, Int32Array, IntArray
 from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.parts import Part, renumbered
 from epsmesh.scene.model import MIRROR
+from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.stages import stage
 
 
@@ -50,9 +51,27 @@ class BodyMesh:
         return int(self.mesh.topology.index_map(self.mesh.topology.dim).size_local)
 
     @property
+    def planes(self) -> dict[str, int]:
+        """Groups of facets in planes of symmetry that bound the mesh, each with the axis normal to it.
+
+        Those are x, y, and z for the plane between two jaws, in the solver's frame, where the tool presses along -z.
+        """
+        return {name: axis for axis, name in enumerate(MIRROR.values()) if name in self.facets}
+
+    @property
     def mirrored(self) -> tuple[int, ...]:
-        """Axes normal to the planes of symmetry that bound the mesh: 0 for x = 0, 1 for y = 0."""
-        return tuple("xy".index(plane) for plane, name in MIRROR.items() if name in self.facets)
+        """Axes normal to the planes of symmetry that cut tool and mesh: 0 for x = 0, 1 for y = 0."""
+        return tuple(axis for name, axis in self.planes.items() if name != MIRROR[MIDDLE])
+
+    @property
+    def is_halved(self) -> bool:
+        """Whether the mesh ends in the plane between two jaws, of which it has one."""
+        return MIRROR[MIDDLE] in self.facets
+
+    @property
+    def images(self) -> float:
+        """Number of mirror images of the mesh in the whole body, itself included; a second jaw is an image, too."""
+        return 2.0 ** len(self.planes)
 
     @property
     def comm(self) -> MPI.Comm:

@@ -124,7 +124,7 @@ def in_model(
         rim_curves = kept["rim"]
         try:
             if scene.rim_segments and len(rim_curves) == 1 and scene.is_flat:
-                parts = 2 ** len(scene.mirrors)
+                parts = 2 ** len(scene.cutting)
                 least = ceil(scene.probe.perimeter / parts / (sizes.times * longest_at_rim(scene.body)))
                 edges = max(scene.rim_segments // parts, least)
                 gmsh.model.mesh.setTransfiniteCurve(rim_curves[0], edges + 1)
@@ -154,7 +154,7 @@ def _at_jaw(scene: Scene, jaw: Probe, sizes: Sizes) -> list[str]:
     """Set the number of edges along the rim of a ``jaw``; return the element sizes around it, as texts for gmsh."""
     frame, unit, curves = jaw.frame_on(scene.body), 1 / scene.scale, rims(scene)[JAW]
     if scene.jaw_segments and len(curves) == 1:
-        gmsh.model.mesh.setTransfiniteCurve(curves[0], scene.jaw_segments // 2 ** len(scene.mirrors) + 1)
+        gmsh.model.mesh.setTransfiniteCurve(curves[0], scene.jaw_segments // 2 ** len(scene.cutting) + 1)
     return sizes.of_jaw.terms(frame.point, jaw.rim_distance(*frame.expressions(unit), unit), unit)
 
 

@@ -16,7 +16,7 @@ from epsmesh.mesh.loose import part_layer
 from epsmesh.mesh.meridian import Meridian
 from epsmesh.mesh.parts import Part, refine, reflect_part, split, whole
 from epsmesh.mesh.refine import refined
-from epsmesh.mesh.reflect import reflect
+from epsmesh.mesh.reflect import NOWHERE, Place, reflect
 from epsmesh.mesh.size import EDGES_PER_RADIUS, Sizes
 from epsmesh.mesh.slit import open_slit
 from epsmesh.mesh.smooth import smoothed
@@ -24,6 +24,8 @@ from epsmesh.plan.refinement import is_refined, refinements
 from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.plan.thin import cause
 from epsmesh.scene.model import Scene
+from epsmesh.shapes.body import Layered
+from epsmesh.shapes.grasp import MIDDLE, middle_plane
 from epsmesh.shapes.half_plane import HalfEllipse, Rectangle
 from epsmesh.shapes.scanned import Scanned
 from epsmesh.study.case import Case
@@ -65,7 +67,7 @@ def unrefined_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" =
     arrays = part_layer(arrays, case.body) if case.body.loose else arrays
     arrays = arrays if scene.straight else curve(arrays, scene)
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
-    found = reflect(arrays, _beyond(case, mirrors))
+    found = _named(reflect(arrays, _beyond(case, mirrors), _middle(case)), case)
     return replace(found, seconds=perf_counter() - start)
 
 
@@ -108,7 +110,8 @@ def refined_part(case: Case, mirrors: tuple[str, ...], part: Part, comm: MPI.Com
     part = refine(part, scene, comm)
     if case.is_linear_beyond:
         part = replace(part, mesh=_with_linear(part.mesh, case))
-    return reflect_part(part, _beyond(case, mirrors))
+    part = reflect_part(part, _beyond(case, mirrors), _middle(case))
+    return replace(part, mesh=_named(part.mesh, case))
 
 
 def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
@@ -121,7 +124,7 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
         sizes = replace(sizes, times=times, rim=at_rim * sizes.rim, column=column / times)
     segments = sizes.rim_segments(case.expected)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
-    folds, jaw = not case.has_quarter_points, case.jaw
+    folds, jaw = not case.has_quarter_points, None if MIDDLE in planes else case.jaw
     scene = Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds)
     if jaw is None:
         return scene, sizes
@@ -132,6 +135,23 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
 def _beyond(case: Case, mirrors: tuple[str, ...]) -> tuple[str, ...]:
     """Return the planes of symmetry in which the mesh of a case is reflected."""
     return tuple(plane for plane in mirror_planes(case) if plane not in mirrors)
+
+
+def _middle(case: Case) -> Place:
+    """Return the place of the plane between two jaws, if the mesh is reflected in it."""
+    return middle_plane(case.body, case.probe) if MIDDLE in mirror_planes(case) else NOWHERE
+
+
+def _named(arrays: MeshArrays, case: Case) -> MeshArrays:
+    """Give cells in mirror images of layers the numbers of the layers that are there, which have the same tissue."""
+    body = case.body
+    if not isinstance(body, Layered) or arrays.regions is None or MIDDLE not in mirror_planes(case):
+        return arrays
+    heights = arrays.points[arrays.cells[:, :4], 2].mean(axis=1)
+    there = 1 + (heights[:, None] < np.array(body.interfaces)).sum(axis=1)
+    number = arrays.regions % len(case.tissues)  # those beyond ε have further ones
+    is_layer = (number > 0) & (number <= len(body.layer))
+    return replace(arrays, regions=arrays.regions + is_layer * (there - number))
 
 
 def _with_linear(arrays: MeshArrays, case: Case) -> MeshArrays:

@@ -14,7 +14,7 @@ from epsmesh.arrays import BoolArray, Int32Array, IntArray
 from epsmesh.mesh.curve import EDGES, curve, interfaces
 from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.refine import NotRefined, refined
-from epsmesh.mesh.reflect import reflect, reflect_labels
+from epsmesh.mesh.reflect import Place, reflect, reflect_labels
 from epsmesh.scene.model import Scene
 from epsmesh.stages import stage
 
@@ -142,12 +142,12 @@ def _labels(part: Part, curved: MeshArrays) -> IntArray:
     return np.concatenate([corners, _edge_labels(part, edges)])
 
 
-def reflect_part(part: Part, planes: tuple[str, ...]) -> Part:
-    """Return a part joined with its mirror images in ``planes``, which bound the mesh."""
+def reflect_part(part: Part, planes: tuple[str, ...], middle: Place) -> Part:
+    """Return a part joined with its mirror images in ``planes``, which bound the mesh: see :func:`.reflect.reflect`."""
     for plane in planes:
         numbers = reflect_labels(part.mesh, part.numbers, part.count, plane)
         beyond = np.vstack([part.beyond, part.beyond[:, [0, 1, 3, 2]]])
-        part = Part(reflect(part.mesh, (plane,)), numbers, 2 * part.count, beyond, part.refinements)
+        part = Part(reflect(part.mesh, (plane,), middle), numbers, 2 * part.count, beyond, part.refinements)
     return part
 
 

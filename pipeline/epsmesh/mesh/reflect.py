@@ -11,16 +11,23 @@ import numpy as np
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.generate import MeshArrays
-from epsmesh.scene.model import MIRROR
+from epsmesh.scene.model import JAW, MIRROR, PROBE
+from epsmesh.shapes.grasp import MIDDLE
 
 # Reflection inverts tetrahedra: corners 2 and 3 are swapped, and with them the mid nodes of their edges.
 _TURNED = {4: [0, 1, 3, 2], 10: [0, 1, 3, 2, 4, 6, 5, 8, 7, 9]}
+# The axis normal to a plane, and where on it the plane is (m).
+Place = tuple[int, float]
+NOWHERE: Place = (2, 0.0)
 
 
-def reflect(mesh: MeshArrays, planes: tuple[str, ...]) -> MeshArrays:
-    """Return ``mesh`` joined with its mirror images in ``planes`` ("x": x = 0, "y": y = 0), which bound it."""
+def reflect(mesh: MeshArrays, planes: tuple[str, ...], middle: Place = NOWHERE) -> MeshArrays:
+    """Return ``mesh`` joined with its mirror images in ``planes`` ("x": x = 0, "y": y = 0), which bound it.
+
+    ``middle`` is the place of the plane between two jaws, where that is one of them.
+    """
     for plane in planes:
-        mesh = _reflect_once(mesh, plane)
+        mesh = _reflect_once(mesh, plane, middle)
     return mesh
 
 
@@ -29,7 +36,7 @@ def reflect_vectors(mesh: MeshArrays, vectors: FloatArray, planes: tuple[str, ..
     for plane in planes:
         images = vectors[~_on_plane(mesh, plane)]
         images[:, "xy".index(plane)] *= -1
-        vectors, mesh = np.vstack([vectors, images]), _reflect_once(mesh, plane)
+        vectors, mesh = np.vstack([vectors, images]), _reflect_once(mesh, plane, NOWHERE)
     return vectors
 
 
@@ -38,14 +45,16 @@ def reflect_labels(mesh: MeshArrays, labels: IntArray, count: int, plane: str) -
     return np.concatenate([labels, labels[~_on_plane(mesh, plane)] + count])
 
 
-def _reflect_once(mesh: MeshArrays, plane: str) -> MeshArrays:
-    axis, name = "xy".index(plane), MIRROR[plane]
+def _reflect_once(mesh: MeshArrays, plane: str, middle: Place) -> MeshArrays:
+    (axis, at), name = middle if plane == MIDDLE else ("xy".index(plane), 0.0), MIRROR[plane]
     points, on_plane = mesh.points.copy(), _on_plane(mesh, plane)
-    points[on_plane, axis] = 0.0
+    points[on_plane, axis] = at
     image = np.where(on_plane, np.arange(len(points)), len(points) + np.cumsum(~on_plane) - 1)
     mirrored = points[~on_plane]
-    mirrored[:, axis] *= -1
+    mirrored[:, axis] = 2 * at - mirrored[:, axis]
     facets = {key: np.vstack([f, image[f]]) for key, f in mesh.facets.items() if key != name}
+    if plane == MIDDLE:
+        facets |= {PROBE: mesh.facets[PROBE], JAW: image[mesh.facets[PROBE]]}
     return replace(
         mesh,
         points=np.vstack([points, mirrored]),

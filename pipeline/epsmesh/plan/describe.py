@@ -184,7 +184,7 @@ def _changes(plan: Plan, case: Case, solve: Solve | None) -> dict[str, str]:
 def _steps(plan: Plan, solve: Solve, step: MeshStep | None) -> list[str]:
     if solve.axisymmetric:
         return _on_meridian(solve.way)
-    part = {0: "whole body", 1: "half of the body", 2: "quarter of the body"}[len(solve.mirrors)]
+    part = ("whole body", "half of the body", "quarter of the body", "eighth of the body")[len(solve.mirrors)]
     shared = f", shared by {len(step.solves)} solves" if step and len(step.solves) > 1 else ""
     return [f"mesh of the {part}{shared}", *_solving(plan, solve, step), "error bar"]
 

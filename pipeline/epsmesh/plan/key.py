@@ -8,9 +8,10 @@ from math import inf
 from typing import Any
 
 from epsmesh.plan.refinement import refinements
-from epsmesh.plan.symmetry import slides_across
+from epsmesh.plan.symmetry import mirror_planes, slides_across
 from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.capsule import Capsule
+from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.part import Around
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.regions import Layer, Region
@@ -78,7 +79,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
-    tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
+    tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}", *_middle_text(case)] if (jaw := case.jaw) else []
     tail += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
     tail += [_time_text(case)] if case.way.in_time else []
@@ -123,8 +124,13 @@ def mesh_key(case: Case) -> str:
     footprint = text_of(case.probe, case.probe.not_drawn)
     refined = [f"refined {times}"] if (times := refinements(case)) else []
     parts = [_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined, *_rim_text(case)]
-    parts += [f"jaw {text_of(jaw, jaw.not_drawn)}"] if (jaw := case.jaw) else []
+    parts += [f"jaw {text_of(jaw, jaw.not_drawn)}", *_middle_text(case)] if (jaw := case.jaw) else []
     return digest("\n".join(parts))
+
+
+def _middle_text(case: Case) -> tuple[str, ...]:
+    """Return that the mesh of a grasp is its own image in the plane between the jaws."""
+    return (MIDDLE,) if MIDDLE in mirror_planes(case) else ()
 
 
 def _rim_text(case: Case) -> tuple[str, ...]:

@@ -119,7 +119,7 @@ def _on_meridian(solve: Solve) -> Solve:
 
 
 def use_symmetry(plan: Plan) -> Plan:
-    """Body, support and probe are symmetric: half or a quarter of the body is solved."""
+    """Body, support and probe are symmetric: half or a quarter of the body is solved, with two equal jaws an eighth."""
     solves = tuple(_mirrored(solve) for solve in plan.solves)
     count = sum(bool(solve.mirrors) for solve in solves)
     return replace(plan, solves=solves).skipping("symmetry", count, reason_of(use_symmetry))

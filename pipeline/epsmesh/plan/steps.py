@@ -25,7 +25,7 @@ MOST_DOFS = 40_000
 class Solve:
     """One case to solve, and the indices of the study's cases that use its record.
 
-    ``mirrors`` are the planes of symmetry ("x": x = 0), so that half or a quarter of the body is solved;
+    ``mirrors`` are the planes of symmetry ("x": x = 0), so that half of the body is solved, or less;
     ``axisymmetric`` solves the meridian; ``reduced`` allows a reduced basis. With a ``goal``, a relative error, the
     case is solved on the meshes of ``later``, in turn, until its error bar is below the goal; ``expected`` is the
     expected error bar of its present mesh. ``end_of`` is the parameter that is at an end of its bar.

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from epsmesh.shapes.body import Body
-from epsmesh.shapes.grasp import opposite
+from epsmesh.shapes.grasp import MIDDLE, is_halved, opposite
 from epsmesh.shapes.probe import PLANES, Probe
 from epsmesh.shapes.tissue import Tissue
 from epsmesh.study.capabilities.obstacles import obstacle
@@ -23,14 +23,14 @@ _FOLDS = 0.25  # depth over half width beyond which the meridian's elements fold
 
 
 def mirror_planes(case: Case) -> tuple[str, ...]:
-    """Return the planes of symmetry of the scene's geometry, of x = 0 ("x") and y = 0 ("y")."""
+    """Return the planes of symmetry of the scene's geometry: x = 0 ("x"), y = 0 ("y"), and that between equal jaws."""
     return _geometry(case.body, case.probe)
 
 
 def movement_planes(case: Case) -> tuple[str, ...]:
     """Return the planes of symmetry of geometry and movement, that of jaws that are pulled included."""
     pulled = dict(zip(PLANES, case.probe.pulled or (0.0, 0.0, 0.0), strict=False))
-    return tuple(plane for plane in _movement(case.body, case.probe) if pulled[plane] == 0)
+    return tuple(plane for plane in _movement(case.body, case.probe) if pulled.get(plane, 0.0) == 0)
 
 
 def slides_across(case: Case) -> bool:
@@ -43,7 +43,15 @@ def slides_across(case: Case) -> bool:
 def model_planes(case: Case) -> tuple[str, ...]:
     """Return the planes of symmetry of geometry, movement, loads and tissue: half or a quarter of the body does."""
     tests = [case.load.is_mirrored, case.body.is_capsule_mirrored, *(tissue.is_mirrored for tissue in case.tissues)]
-    return tuple(plane for plane in movement_planes(case) if all(test(PLANES[plane]) for test in tests))
+
+    def is_mirrored(plane: str) -> bool:
+        if plane != MIDDLE:
+            return all(test(PLANES[plane]) for test in tests)
+        # Faces have the same name on both sides, and outputs are at places of the whole body.
+        is_plain = not (case.load.terms or case.outputs)
+        return is_plain and all(tissue.is_mirrored(case.frame.outward) for tissue in case.tissues)
+
+    return tuple(plane for plane in movement_planes(case) if is_mirrored(plane))
 
 
 def is_round(case: Case) -> bool:
@@ -112,7 +120,10 @@ def _geometry(body: Body, probe: Probe) -> tuple[str, ...]:
         if plane in held and upright and probe.is_mirrored(along, across):
             found.append(plane)
     jaw = opposite(body, probe)
-    return tuple(found) if jaw is None else tuple(plane for plane in found if plane in _geometry(body, jaw))
+    if jaw is None:
+        return tuple(found)
+    found = [plane for plane in found if plane in _geometry(body, jaw)]
+    return (*found, MIDDLE) if is_halved(body, probe) else tuple(found)
 
 
 @lru_cache(_MANY)
@@ -120,4 +131,4 @@ def _movement(body: Body, probe: Probe) -> tuple[str, ...]:
     if probe.motion == "all":
         return ()
     travel = dict(zip(PLANES, probe.travel(probe.frame_on(body)), strict=False))
-    return tuple(plane for plane in _geometry(body, probe) if travel[plane] == 0)
+    return tuple(plane for plane in _geometry(body, probe) if travel.get(plane, 0.0) == 0)

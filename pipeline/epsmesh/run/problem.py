@@ -76,6 +76,8 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     _check_loose(case, spaces.body.mirrored)
     tool = tool_of(case) if case.way.is_found else None
     degree, conditions = case.mesh.degree, conditions_of(case)
+    if tool is not None and spaces.body.is_halved:  # the second jaw is the image of the tool
+        tool, conditions = replace(tool, beds=()), replace(conditions, beds=())
     loads, shape = imaged_loads_of(case), None
     if loads is not None and spaces.body.imaged is None:
         shape = unload(spaces.body, degree, conditions, case.way.element, law_of(case), loads)

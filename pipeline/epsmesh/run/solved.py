@@ -35,6 +35,7 @@ from epsmesh.run.problem import (
 )
 from epsmesh.run.record import Record
 from epsmesh.run.threads import one_thread
+from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.solve import SolveError
 from epsmesh.solve.cell_values import clear_cells
 from epsmesh.solve.compiled import compiling
@@ -75,7 +76,9 @@ def solve_alone(study: Study, case: Case) -> Solve:
     """
     run = next(solve for solve in make_plan(study).solves if case.index in solve.serves)
     solve = next(solve for solve in first_attempts(declare(study)).solves if case.index in solve.serves)
-    mirrors = model_planes(case) if case.mesh.model == "auto" else ()
+    # Fields have both jaws.
+    planes = tuple(plane for plane in model_planes(case) if plane != MIDDLE)
+    mirrors = planes if case.mesh.model == "auto" else ()
     shown = replace(solve.case, far_region=run.case.far_region)
     return replace(solve, case=shown, mirrors=mirrors, axisymmetric=run.axisymmetric)
 

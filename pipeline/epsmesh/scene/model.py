@@ -24,6 +24,7 @@ from epsmesh.shapes.body import Body, Drawn
 from epsmesh.shapes.contact import is_flat, is_level
 from epsmesh.shapes.files.loaded import UNITS
 from epsmesh.shapes.frame import Frame
+from epsmesh.shapes.grasp import MIDDLE, middle_plane
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.support import NONE
@@ -34,7 +35,8 @@ TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
 JAW = "jaw"  # what a second jaw may touch
 LOOSE, BELOW = "loose", "below"  # where a loose layer touches the tissue below it, and the other side
 SLIT = "slit"  # the part of a slit's faces that the blade does not touch
-MIRROR = {"x": "mirror_x", "y": "mirror_y"}
+# Those of planes of symmetry, by the names of these: of x, of y, and between two jaws.
+MIRROR = {"x": "mirror_x", "y": "mirror_y", MIDDLE: "mirror_middle"}
 
 _BODY_SIZE = 100.0  # extent of the body in the model: OpenCASCADE's tolerance of 1e-7 is then 1e-9 of it
 _CLOSE = 1e-6 * _BODY_SIZE  # in the model's unit
@@ -50,8 +52,8 @@ class Scene:
     ``column`` is the radius (m) of the part kept around the probe's axis, or infinite; with ``is_ball`` the part within
     that distance of the contact is kept. ``rim_segments`` is the number of edges along a round rim, for ``straight``
     elements, which cannot be curved; ``jaw_segments`` are those of a ``jaw`` opposite the probe. ``mirrors`` are the
-    planes of symmetry; only their positive side is modelled. ``rim_folds``: quarter-point elements at the rim would
-    fold.
+    planes of symmetry; only their positive side is modelled, and of that between two jaws the side of the probe.
+    ``rim_folds``: quarter-point elements at the rim would fold.
     """
 
     body: Body
@@ -65,6 +67,15 @@ class Scene:
     rim_folds: bool = False
     jaw: Probe | None = None
     jaw_segments: int = 0
+
+    @property
+    def cutting(self) -> tuple[str, ...]:
+        """Those of the planes of symmetry that cut the probe."""
+        return tuple(plane for plane in self.mirrors if plane != MIDDLE)
+
+    def plane(self, name: str) -> tuple[int, float]:
+        """Return the axis normal to a plane of symmetry, and where on it the plane is (m)."""
+        return middle_plane(self.body, self.probe) if name == MIDDLE else ("xy".index(name), 0.0)
 
     @property
     def tools(self) -> dict[str, Probe]:
@@ -108,7 +119,7 @@ class Scene:
     @property
     def has_inner_slit(self) -> bool:
         """Whether there is a slit inside the model, rather than in a plane of symmetry that bounds it."""
-        return self.probe.slit is not None and mirror_of(self.frame, self.mirrors) is None
+        return self.probe.slit is not None and mirror_of(self.frame, self.cutting) is None
 
     @cached_property
     def cut_face(self) -> Surface:
@@ -139,7 +150,7 @@ def build(scene: Scene) -> list[int]:
     of_probe = len(printed)
     if scene.jaw is not None:
         printed = [*printed, (2, scene.jaw.draw(occ, scene.jaw.frame_on(scene.body), scene.units))]
-    heights = (*scene.body.hold.edges(), *scene.body.interfaces)
+    heights = (*scene.body.hold.edges(), *(height for height in scene.body.interfaces if not _is_mirror(scene, height)))
     tools = [*printed, *((2, _add_level(scene.units(height))) for height in heights)]
     tools += draw_inclusions(scene.body.inclusion, scene.units)
     first = len(volumes) + len(tools)
@@ -220,14 +231,25 @@ def _add_footprint(scene: Scene, volumes: list[tuple[int, int]]) -> list[tuple[i
 
 def _is_on_mirror(scene: Scene, points: FloatArray) -> bool:
     """Return whether points (n, 3), in the model's units, are all in one of the planes of symmetry."""
-    return any(bool(np.all(np.abs(points[:, "xy".index(plane)]) < _CLOSE)) for plane in scene.mirrors)
+    planes = map(scene.plane, scene.mirrors)
+    return any(bool(np.all(np.abs(points[:, axis] - scene.units(at)) < _CLOSE)) for axis, at in planes)
+
+
+def _is_mirror(scene: Scene, height: float) -> bool:
+    """Return whether a plane of symmetry is horizontal, and at this ``height`` (m)."""
+    planes = map(scene.plane, scene.mirrors)
+    return any(axis == 2 and abs(at - height) < scene.scale * _CLOSE for axis, at in planes)
 
 
 def _add_positive_side(scene: Scene) -> int:
-    """Add a box that contains the positive side of every plane of symmetry."""
+    """Add a box that contains the modelled side of every plane of symmetry."""
     size = 3 * _BODY_SIZE
-    low = [0.0 if plane in scene.mirrors else -size for plane in "xy"]
-    return gmsh.model.occ.addBox(*low, -size, size - low[0], size - low[1], 2 * size)
+    low, high = [-size] * 3, [size] * 3
+    for plane in scene.mirrors:
+        axis, at = scene.plane(plane)
+        side = high if plane == MIDDLE and scene.frame.axis[axis] > 0 else low
+        side[axis] = scene.units(at)
+    return gmsh.model.occ.addBox(*low, *(end - start for start, end in zip(low, high, strict=True)))
 
 
 def _add_column(scene: Scene) -> int:
@@ -315,8 +337,8 @@ def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
     """Return tests, in order, for the group of a face, from points (m) of its surface."""
     close, surfaces = scene.scale * _CLOSE, scene.body.surfaces()
 
-    def on_mirror(points: Any, axis: int) -> bool:
-        return bool(np.all(np.abs(points[:, axis]) < close))
+    def on_mirror(points: Any, axis: int, at: float) -> bool:
+        return bool(np.all(np.abs(points[:, axis] - at) < close))
 
     def on_cut(points: Any) -> bool:
         return scene.is_cut and bool(np.all(np.abs(scene.cut_face.distance(points)) < close))
@@ -324,5 +346,6 @@ def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
     def is_held(points: Any) -> bool:
         return scene.body.hold.holds(surfaces, points, close)
 
-    mirrors = [(MIRROR[plane], partial(on_mirror, axis="xy".index(plane))) for plane in scene.mirrors]
+    planes = ((MIRROR[plane], *scene.plane(plane)) for plane in scene.mirrors)
+    mirrors = [(name, partial(on_mirror, axis=axis, at=at)) for name, axis, at in planes]
     return [*mirrors, (CUT, on_cut), (FIXED, is_held)]

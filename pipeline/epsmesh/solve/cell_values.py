@@ -21,7 +21,7 @@ from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.mesh.curve import EDGES
 from epsmesh.mesh.distribute import BodyMesh, distribute
 from epsmesh.quantities import CLEAR
-from epsmesh.scene.model import FIXED, MIRROR, PROBE
+from epsmesh.scene.model import FIXED, JAW, MIRROR, PROBE
 from epsmesh.solve.compiled import cellwise_space, form_like, vector_space
 from epsmesh.solve.conditions import Front
 from epsmesh.solve.forms import one_cell
@@ -181,7 +181,7 @@ def plain_share(body: BodyMesh) -> float:
 def clear_cells(body: BodyMesh, front: Front | None = None, *, wholly: bool = False) -> BoolArray:
     """Return a mask of the owned cells that are clear of edges with singular strain; collective.
 
-    Singular edges are the rim of the footprint, the edge of the support, and the ``front`` of a slit. A cell is clear
+    Singular edges are the rims of footprints, the edge of the support, and the ``front`` of a slit. A cell is clear
     if its centre is farther from them than a tenth of the footprint's half width (the largest distance within the
     footprint to its rim). It is ``wholly`` clear if all its corners are, too.
     """
@@ -195,7 +195,7 @@ def clear_cells(body: BodyMesh, front: Front | None = None, *, wholly: bool = Fa
     if wholly:
         places = np.concatenate([places, corners], axis=1)
     clear = np.ones(places.shape[:2], dtype=bool)
-    for edges in (rim, _points_of(body, _on_edge(body, FIXED))):
+    for edges in (rim, *(_points_of(body, _on_edge(body, name)) for name in (JAW, FIXED))):
         if len(edges):  # most places are outside the box of what is near
             near = ((places >= edges.min(axis=0) - least) & (places <= edges.max(axis=0) + least)).all(axis=2)
             clear[near] &= np.isinf(cKDTree(edges).query(places[near], distance_upper_bound=least)[0])

@@ -53,6 +53,10 @@ class ContactResult:
     @property
     def note(self) -> str:
         """What no bar of the force tells, "" if nothing."""
+        return "; ".join(filter(None, (self._moves, "" if self.pull is None else self.pull.note)))
+
+    @property
+    def _moves(self) -> str:
         if not self.shift >= _MOVED * self.radius:
             return ""
         by = f"{in_mm(self.shift)}, {self.shift / self.radius:.2g} contact radii"
@@ -137,6 +141,7 @@ class PullResult:
 
     Slip ``begins`` at the first node, and is that of the ``whole`` contact of both; None if it is not. ``work`` (J) of
     the jaws is the ``heat`` of friction and what the tissue has ``stored``, from the beginning of the pull on.
+    ``doubtful`` are the names of slips that only some of the pulls reach from which bars are.
     """
 
     forces: tuple[float, float]
@@ -147,6 +152,18 @@ class PullResult:
     stored: float
     closed: float
     bar: float = nan
+    doubtful: tuple[str, ...] = ()
+
+    @property
+    def note(self) -> str:
+        """What the bars do not tell, "" if nothing."""
+        if not self.doubtful:
+            return ""
+        names = " and ".join(f"slip_{name}" for name in self.doubtful)
+        return (
+            f"the pull ends so near to {names} that with half the steps, or elements of one degree more, it is reached "
+            "or not: it is missing, or has no error bar; a larger pull reaches it"
+        )
 
     def with_bar(self, relative: float) -> "PullResult":
         """Return it with a ``relative`` bar on forces."""
@@ -163,7 +180,10 @@ class PullResult:
     def with_change(self, one: "PullResult", other: "PullResult") -> "PullResult":
         """Return it with bars on slip that cover the change from ``one`` pull to an ``other``, too."""
         begins = self.begins and self.begins.with_change(one.begins, other.begins)
-        return replace(self, begins=begins, whole=self.whole and self.whole.with_change(one.whole, other.whole))
+        whole = self.whole and self.whole.with_change(one.whole, other.whole)
+        seen = {name: [getattr(pull, name) is None for pull in (self, one, other)] for name in ("begins", "whole")}
+        differ = (name for name, missing in seen.items() if any(missing) and not all(missing))
+        return replace(self, begins=begins, whole=whole, doubtful=tuple(dict.fromkeys((*self.doubtful, *differ))))
 
 
 @dataclass(frozen=True)

@@ -23,15 +23,16 @@ def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None
     Planes of symmetry hold no body: a motion that they exclude is free all the same. Between motions of which one is
     its own image in a plane, and the other its opposite, the forces on the whole body do no work.
 
-    Where it rests on ``beds``, each is given by its normal (3), and whether it rubs; planes of symmetry then do hold.
+    Where it rests on ``beds``, each is given by its normal (3), and whether it rubs; planes of symmetry then do hold,
+    as does that between two jaws.
 
     Raises:
         SolveError: if they leave one.
     """
-    rests = bool(space.conditions.beds)
+    rests = bool(space.conditions.beds) or space.body.is_halved
     if not (space.terms or rests) or space.comm.allreduce(len(space.fixed_owned)):
         return
-    places, planes = space.places.reshape(-1, 3), list(space.body.mirrored)
+    places, planes = space.places.reshape(-1, 3), list(space.body.planes.values())
     *centre, count = global_sum(space.comm, np.array([*places.sum(axis=0), len(places)]))
     middle = np.array(centre) / count
     middle[planes] = 0.0
@@ -54,6 +55,8 @@ def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None
     if rests:  # along a bed it slides without work: its place is that of the model
         kept = images.all(axis=1)
         motions, stiffness = dict(compress(motions.items(), kept)), stiffness[np.ix_(kept, kept)]
+        if not motions:
+            return
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     if not values[0] > _FREE * max(abs(values[-1]), size):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]

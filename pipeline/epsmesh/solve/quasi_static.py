@@ -138,6 +138,8 @@ class QuasiStaticProblem(Problem):
             front, tip = self._released(self.elements, found.columns, law, found.movement)
             self.elements.show(found.columns)
             stored = found.solver.stored
+            if stored is None and self._body.is_halved:  # both jaws work
+                stored = 2 * found.response.energy / self._body.images
             solution = Solution(
                 response=found.response,
                 load_response=found.load_response,
@@ -149,7 +151,7 @@ class QuasiStaticProblem(Problem):
                 times=times,
                 front=front,
                 tip=tip,
-                stored=None if stored is None else 2.0 ** len(self._body.mirrored) * stored,
+                stored=None if stored is None else self._body.images * stored,
             )
             if asked.estimate:
                 solution = self._estimated(solution, found, asked)
@@ -232,7 +234,7 @@ class QuasiStaticProblem(Problem):
         )
         return replace(
             solution,
-            contact=found.contact and _with_bars(found.contact, finer),
+            contact=found.contact and _with_bars(found.contact, finer, relative, is_halved=self._body.is_halved),
             plain=plain,
             is_solved=finer.is_solved,
             unseen=None if unseen is None else unseen[: len(movement.motions)],
@@ -307,10 +309,14 @@ def _form(response: Response, load_response: LoadResponse | None) -> FloatArray:
     return response.stiffness if load_response is None else load_response.form
 
 
-def _with_bars(contact: ContactResult, finer: HierarchicalEstimate) -> ContactResult:
+def _with_bars(
+    contact: ContactResult, finer: HierarchicalEstimate, relative: FloatArray, *, is_halved: bool
+) -> ContactResult:
+    """Return a contact with its bars; the second jaw has those of the tool, ``relative`` on F, if it is its image."""
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
     if contact.rest is not None:
-        found = replace(found, rest=replace(contact.rest, bar=finer.rest_bar, force_bar=finer.rest_force_bar))
+        bars = (finer.area_bar, float(relative[0])) if is_halved else (finer.rest_bar, finer.rest_force_bar)
+        found = replace(found, rest=replace(contact.rest, bar=bars[0], force_bar=bars[1]))
     if finer.pull is not None:
         found = replace(found, pull=finer.pull)
     if contact.rubbing is None or finer.relative is None:

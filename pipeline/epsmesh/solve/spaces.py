@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from epsmesh import compat
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh
-from epsmesh.scene.model import FIXED, MIRROR, PROBE
+from epsmesh.scene.model import FIXED, PROBE
 from epsmesh.solve import SolveError
 from epsmesh.solve.coarse_levels import CoarseSpace, coarse_space
 from epsmesh.solve.compiled import assemble, fill, vector_space
@@ -44,7 +44,8 @@ class ElasticSpace:
     """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
-    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of beds, index owned blocks of three dofs.
+    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of beds, index owned blocks of three dofs; ``bearing_owned``
+    are those whose reactions along z balance the tool's: of the support, and of the plane between two jaws.
     ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the conditions,
     ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
@@ -71,7 +72,7 @@ class ElasticSpace:
         # Candidates for unilateral contact may be on the support: the active set leaves them out.
         if not conditions.unilateral and self.comm.allreduce(len(np.intersect1d(probe, fixed))):
             raise SolveError("the probe's footprint touches the fixed face: no displacement satisfies both conditions")
-        mirrors = list(zip(body.mirrored, _planes(space, body), strict=True))
+        mirrors = list(zip(body.planes.values(), _planes(space, body), strict=True))
         single = [(3 * probe + axis, axis) for axis in conditions.components]
         single += [(3 * plane + axis, axis) for axis, plane in mirrors]
         self._probe, self._fixed, self._single, self._sides = probe, fixed, single, self._sides_of(probe)
@@ -79,6 +80,8 @@ class ElasticSpace:
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
         of_blocks = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed, resting))
         self.probe_owned, self.fixed_owned, self.resting_owned = of_blocks
+        middle = mirrors[-1][1] if body.is_halved else _NO_DOFS
+        self.bearing_owned = np.union1d(self.fixed_owned, middle[middle < index_map.size_local])
         self.forms = ElasticForms(space, body.regions, cell_kernel, self.factors)
         self.terms: list[Term] = [term.on(body, self.forms.displacement) for term in conditions.terms]
 
@@ -349,7 +352,7 @@ def _curved(body: BodyMesh, factors: Factors | None) -> BoolArray | None:
 
 def whole_points(space: Any, body: BodyMesh) -> int:
     """Return the number of points of ``space`` on the whole body: mirror images count, points in planes once."""
-    images = np.full(space.dofmap.index_map.size_local, 2.0 ** len(body.mirrored))
+    images = np.full(space.dofmap.index_map.size_local, body.images)
     for plane in _planes(space, body):
         images[plane[plane < len(images)]] /= 2
     return round(body.comm.allreduce(float(images.sum()), op=MPI.SUM))
@@ -357,8 +360,7 @@ def whole_points(space: Any, body: BodyMesh) -> int:
 
 def _planes(space: Any, body: BodyMesh) -> list[Int32Array]:
     """Local points of ``space`` in each of the planes of symmetry that bound the mesh."""
-    names = [MIRROR["xy"[axis]] for axis in body.mirrored]
-    return [_points(space, body, name) for name in names]
+    return [_points(space, body, name) for name in body.planes]
 
 
 def _points_beyond(space: Any, body: BodyMesh, front: Front) -> Int32Array:

@@ -14,6 +14,7 @@ JAW = "jaw"
 # What a tool alone may have in place of a depth.
 _NOT_TOGETHER = ("insertion",)
 NOT_CLOSED = "is not computed where two jaws close"
+FOUND_TOGETHER = 'must be "unilateral" in a grasp: the contacts of both jaws are found together'
 # Keys of the first jaw alone: both have the same place, axis and friction.
 _OF_FIRST = (
     "at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths",
@@ -60,6 +61,9 @@ def _is_sane(first: dict[str, Any], second: dict[str, Any], where: str, problems
     for key in swept:
         told = "is a list: sweep it in the first table, whose keys the second one has if it leaves them out"
         problems.error(f"{where}.{key}", second[key], told)
+    if (contact := second.get("contact", "unilateral")) != "unilateral":
+        problems.error(f"{where}.contact", contact, FOUND_TOGETHER)
+        return False
     shape = second.get("shape")
     if shape is not None and shape not in PROBES:
         problems.error(f"{where}.shape", shape, f"unknown shape: use one of {', '.join(PROBES)}")

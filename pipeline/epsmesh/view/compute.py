@@ -20,6 +20,7 @@ from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.problem import beds_on
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
 from epsmesh.scene.model import BELOW, PROBE
+from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.section import in_mm
 from epsmesh.solve.cell_values import CellValues
 from epsmesh.solve.compiled import vector_space
@@ -141,7 +142,8 @@ def _whole(
         strain = np.tile(strain, 2 ** len(mirrors))
     whole = reflect(arrays, mirrors)
     points = whole.points + np.subtract(case.frame.point, solve.meshed_case.frame.point)
-    fields = Fields(case, points, whole.cells, whole.facets, mirror_planes(case), displacement, strain)
+    planes = tuple(plane for plane in mirror_planes(case) if plane != MIDDLE)
+    fields = Fields(case, points, whole.cells, whole.facets, planes, displacement, strain)
     if case.varies:
         young = moduli_of(case, fields.centres, whole.regions)
         is_known = young > 0  # in a mesh alone, some may lack

@@ -32,7 +32,7 @@ _STATES = {
 
 _ORIGINS = {
     "solved": "solved for themselves, on the whole body",
-    "symmetric": "solved on a half or a quarter of the body",
+    "symmetric": "solved on a half, a quarter or an eighth of the body",
     "axisymmetric": "solved on the meridian of a round scene",
     "scaled": "F of another case, in proportion to Young's modulus and depth",
     "mirrored": "F of another place, onto which a symmetry of the body maps this one",

@@ -87,6 +87,7 @@ class LinearContact:
             candidates.from_regions(self.sweep.law.plane_moduli),
             self._plug.body.mirrored,
             None if rubbed is None else rubbed.coarse,
+            self._plug.body.is_halved,
         )
 
     @property
@@ -136,7 +137,7 @@ class LinearContact:
         space, (depth,), force = self._plug.displacements, movement.amounts, self.surface.force
         products = self._plug.products(self.sweep.law, [column])
         (moved,), (residual,) = products.moved, products.residuals
-        local = np.array([residual.reshape(-1, 3)[space.fixed_owned, 2].sum(), moved @ residual])
+        local = np.array([residual.reshape(-1, 3)[space.bearing_owned, 2].sum(), moved @ residual])
         support, energy = global_sum(space.comm, depth * local * (1.0, depth))
         touched, across = self.surface.touched, np.zeros(2)
         if self.rubbed is None:

@@ -232,7 +232,7 @@ class LargeContactSolution:
         found = replace(found, rest=self.rests[0].result()) if self.rests else found
         if self.beside is None or not self.beside.pulls:
             return found
-        return replace(found, pull=self.beside.pulls[-1].result(2.0 ** len(self.body.elements.body.mirrored)))
+        return replace(found, pull=self.beside.pulls[-1].result(self.body.elements.body))
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -249,7 +249,7 @@ class LargeContactSolution:
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
         space = self.body.elements.displacements
-        local = self.body.residual().reshape(-1, 3)[space.fixed_owned, 2].sum()
+        local = self.body.residual().reshape(-1, 3)[space.bearing_owned, 2].sum()
         support = float(global_sum(space.comm, np.array([local]))[0])
         support += sum(float(rest.force[2]) for rest in self.rests if not rest.bed.is_tissue)
         support -= float(self.body.on_terms[2])
@@ -281,7 +281,8 @@ class LargeContactSolution:
             above = (self.body, self.surface, self.beside.smooth.tool, self.depth, LargeContact.STEPS // 2)
             assert found.relative is not None
             at_edge = max([self.surface_contact.area.bar, *(rest.area.bar for rest in self.rests)])
-            bars = (float(found.relative[0]), found.rest_force_bar), at_edge
+            of_jaws = [float(found.relative[0]), *([found.rest_force_bar] if self.rests else [])]
+            bars = of_jaws, at_edge
             return replace(found, pull=with_bars(self.beside.pulls, *above, bars, stack))
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.

@@ -12,6 +12,7 @@ import numpy as np
 
 from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
+from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.checks import force_of
@@ -83,14 +84,14 @@ class Pull:
         """Return the relative change of each jaw's force at the end to that of an ``other`` pull."""
         return tuple(again / own - 1 for own, again in zip(self.end.forces, other.end.forces, strict=True))
 
-    def result(self, images: float) -> PullResult:
-        """Return that of the whole body, of which the modelled part has so many ``images``."""
-        slid = self.steps[0].sliding
-        begins = self._slip(lambda step: bool((step.sliding & ~slid).any()), images)
-        whole = self._slip(lambda step: min(step.shares) == 1.0, images)
-        first, second = (images * force for force in self.end.forces)
-        of_whole = (images * value for value in (self.work, self.heat, self.stored, self.closed))
-        return PullResult((first, second), begins, whole, *of_whole)
+    def result(self, body: BodyMesh) -> PullResult:
+        """Return that of the whole of a ``body``, of which a part is modelled, with both jaws or one."""
+        slid, of_tool = self.steps[0].sliding, 2.0 ** len(body.mirrored)
+        begins = self._slip(lambda step: bool((step.sliding & ~slid).any()), body.images)
+        whole = self._slip(lambda step: min(step.shares) == 1.0, body.images)
+        first, second = (of_tool * force for force in (2 * self.end.forces)[:2])
+        work, heat, stored = (body.images * value for value in (self.work, self.heat, self.stored))
+        return PullResult((first, second), begins, whole, work, heat, stored, of_tool * self.closed)
 
     def _slip(self, has_slipped: Callable[[PullStep], bool], images: float) -> Slip | None:
         """Return between which steps slip begins, None if it does not."""
@@ -199,7 +200,7 @@ def with_bars(
     of_degree = [found_again_bar(share, at_edge, least)[1] for share in coarse.changes(again)]
     of_steps = map(abs, fine.changes(coarse))
     bar = float(np.max([*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True))]))
-    half, whole, finest = (pull.result(2.0 ** len(elements.body.mirrored)) for pull in (coarse, fine, again))
+    half, whole, finest = (pull.result(elements.body) for pull in (coarse, fine, again))
     found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
     # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
     return replace(found, begins=found.begins and found.begins.from_zero())
@@ -232,10 +233,11 @@ def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolut
 
 def _ended(why: SolveError, steps: list[PullStep], body: DeformedBody, depth: float, length: float) -> LargeError:
     """Return the error of a pull that goes no farther than the last of its ``steps``, with the force before."""
-    whole, last = 2.0 ** len(body.elements.body.mirrored), steps[-1]
-    pressed = whole * force_of(body.part().solution(steps[0].touched))
+    mesh, last = body.elements.body, steps[-1]
+    pressed = 2.0 ** len(mesh.mirrored) * force_of(body.part().solution(steps[0].touched))
     return LargeError(
         f"the pull reached {1e3 * last.moved:.3g} mm of {1e3 * length:.3g} mm, where the force along it is "
-        f"{whole * last.force:.4g} N ({why}); use a smaller pull, smaller elements below the jaws, or less friction",
+        f"{mesh.images * last.force:.4g} N ({why}); use a smaller pull, smaller elements below the jaws, or less "
+        "friction",
         (depth, pressed),
     )

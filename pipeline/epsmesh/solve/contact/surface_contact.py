@@ -17,7 +17,8 @@ from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import ContactResult, RestResult
+from epsmesh.solve.response import whole_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class SurfaceContact:
 
     The points of the candidates are where the contact is: at rest in linear elasticity, else deformed. ``modulus`` (n)
     is E / (1 - ν²) of the tissue there (Pa), ``mirrored`` are the axes of the planes of symmetry. ``coarse`` is the
-    contact from half as many load steps.
+    contact from half as many load steps. With ``is_halved`` a second jaw is the image of the tool.
     """
 
     candidates: Candidates
@@ -35,6 +36,7 @@ class SurfaceContact:
     modulus: FloatArray
     mirrored: tuple[int, ...]
     coarse: ContactSolution | None = None
+    is_halved: bool = False
 
     @property
     def force(self) -> float:
@@ -73,11 +75,25 @@ class SurfaceContact:
         """Return the whole contact; ``sag`` (m), ``load_energy`` (J) of the whole body and ``shift`` (m) are the
         effects of loads."""
         found = ContactResult(self.whole_area, sag=sag, load_energy=load_energy, is_ended=self.is_ended, shift=shift)
-        if self.coarse is None:
-            return found
-        rubbing = rubbing_of(self.candidates, self.tool.friction, self.touched, self.coarse)
-        torque = self.tool.torque(self.candidates.points, self.touched.forces)
-        return found.with_friction(rubbing, torque, self.mirrored)
+        if self.coarse is not None:
+            rubbing = rubbing_of(self.candidates, self.tool.friction, self.touched, self.coarse)
+            torque = self.tool.torque(self.candidates.points, self.touched.forces)
+            found = found.with_friction(rubbing, torque, self.mirrored)
+        return replace(found, rest=self._image(found)) if self.is_halved else found
+
+    def _image(self, found: ContactResult) -> RestResult:
+        """Return what the image of the tool does, in a plane normal to its axis; ``found`` is the tool's contact."""
+        forces = np.zeros(3)
+        forces[-self.touched.forces.shape[1] :] = self.touched.forces.sum(axis=0)
+        x, y, z = map(float, whole_force(forces, self.mirrored))
+        return RestResult(
+            force=(x, y, 0.0 - z),
+            normal=(0.0, 0.0, 1.0),
+            area=found.area,
+            lifted=0.0,
+            torque=0.0 - found.torque,
+            torque_bar=found.torque_bar,
+        )
 
 
 def on_surface(
@@ -89,5 +105,5 @@ def on_surface(
     if not body.law.is_linear:
         candidates = replace(candidates, points=part.of(body.positions()))
     modulus, mirrored = candidates.from_regions(body.law.plane_moduli), body.elements.body.mirrored
-    coarse = None if coarse is None else part.solution(coarse)
-    return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse)
+    coarse, is_halved = None if coarse is None else part.solution(coarse), body.elements.body.is_halved
+    return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse, is_halved)

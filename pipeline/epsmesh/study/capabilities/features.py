@@ -304,8 +304,9 @@ FEATURES: dict[str, Feature] = {
     "unloaded shape": Feature("body.is_loaded", _is_imaged, ("load",)),
     "terms": Feature("load", has_terms, ("body", "probe")),
     "grasp": Feature("probe.together", lambda s: s.probe.jaw is not None),
+    # Of a second jaw, its table is checked: study/grasp.py.
     "prescribed footprint of a grasp": Feature(
-        "probe.contact", lambda s: s.probe.jaw is not None and not (s.probe.is_unilateral and s.probe.jaw.is_unilateral)
+        "probe.contact", lambda s: s.probe.jaw is not None and not s.probe.is_unilateral
     ),
     "pull": Feature("probe.pull", lambda s: s.probe.pull is not None, write=in_mm),
     "pull of one tool": Feature("probe.pull", lambda s: s.probe.pull is not None and s.probe.jaw is None),

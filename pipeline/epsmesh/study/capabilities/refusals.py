@@ -14,7 +14,7 @@ from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.term import BodyTerm
 from epsmesh.study.capabilities.features import FEATURES, MOST_OF_GREEN, PLACE, Scene
-from epsmesh.study.grasp import NOT_CLOSED
+from epsmesh.study.grasp import FOUND_TOGETHER, NOT_CLOSED
 from epsmesh.study.problems import Problems
 from epsmesh.study.schema import Material
 
@@ -313,11 +313,7 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("loose layer", "time steps", f"is static, and {_IN_STEPS}: {_STATIC}"),
     *(Refusal(name, "loose layer", f"{_LOOSE}: omit it, or the layer's contact") for name in ("influence", "spread")),
     # Two jaws: the contact of the second one is found with that of the tool.
-    Refusal(
-        "prescribed footprint of a grasp",
-        "grasp",
-        'must be "unilateral" in a grasp: the contacts of both jaws are found together',
-    ),
+    Refusal("prescribed footprint of a grasp", "grasp", FOUND_TOGETHER),
     Refusal(
         "jaw with a sharp edge",
         "large displacements",
