@@ -17,7 +17,7 @@ from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.mesh.reflect import reflect
 from epsmesh.mesh.size import Sizes
 from epsmesh.scene.model import Scene
-from tests.cases import BLADE, study
+from tests.cases import BLADE, NO_SIZES, solve, study
 from tests.sampling import sampled
 
 SIZES = Sizes(epsilon=8e-3, fine=2e-3, coarse=8e-3, rim=0.4e-3, growth=0.5)
@@ -225,3 +225,18 @@ def test_a_mesh_that_fails_is_made_with_other_sizes(monkeypatch):
     monkeypatch.setattr("gmsh.model.mesh.generate", fails_once)
     assert len(generate(scene(), SIZES).cells) > 0
     assert len(attempts) == 2
+
+
+def test_a_face_that_gmsh_cannot_mesh_is_a_failed_case():
+    """gmsh threw its error where nothing caught it, and the process ended."""
+    balls = {
+        "region-0": (["-19.78 mm", "-1.305 mm", "-13.66 mm"], ["2.078 mm"] * 3),
+        "region-1": (["-14.49 mm", "13.72 mm", "-8.786 mm"], ["0.8495 mm", "1.373 mm", "1.238 mm"]),
+        "region-2": (["-19.79 mm", "-4.197 mm", "-9.807 mm"], ["1.971 mm", "1.112 mm", "0.9323 mm"]),
+    }
+    tissue = {"young": "5 kPa", "poisson": 0.4}
+    regions = [{"name": name, "at": at, "axes": axes, **tissue} for name, (at, axes) in balls.items()]
+    body = {"size": ["53.95 mm", "31.89 mm", "20.18 mm"], "inclusion": regions}
+    probe = {"radius": "2.781 mm", "depth": "0.1814 mm", "at": ["-1.433 mm", "4.366 mm"]}
+    (record,) = solve(body=body, probe=probe, mesh=NO_SIZES | {"accuracy": "1.83 %"}).values()
+    assert record.status == "ok" or record.message.startswith("gmsh: ")

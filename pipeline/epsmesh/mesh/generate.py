@@ -14,6 +14,7 @@ from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.compat import gmsh_session
 from epsmesh.mesh.follow import middle_nodes, rounded_sizes
 from epsmesh.mesh.model_arrays import corners_of, numbered_points, points_by_tag
+from epsmesh.mesh.reason import generate as mesh_model
 from epsmesh.mesh.reason import reason
 from epsmesh.mesh.regions import LocalSizes, longest_at_rim, region_sizes
 from epsmesh.mesh.size import Sizes, set_size_field
@@ -139,7 +140,7 @@ def in_model(
             last = set_size_field(sizes, scene.probe, scene.frame, scene.scale, more, lifted)
             if scene.body.region:
                 gmsh.model.geo.synchronize()  # points to which sizes refer
-            gmsh.model.mesh.generate(dim)
+            mesh_model(dim)
             folded = _folded()
         except Exception as error:  # gmsh raises bare Exception
             raise MeshError(f"gmsh: {reason(error)}") from error

@@ -19,7 +19,7 @@ from epsmesh.mesh.organ.borders import Bordered, are_within, borders_within, cut
 from epsmesh.mesh.organ.faces import Faces
 from epsmesh.mesh.organ.field import Field
 from epsmesh.mesh.organ.sheet import FIXED, FREE, PROBE, WALL, Sheet, compact, edges_of, groups_of
-from epsmesh.mesh.reason import reason
+from epsmesh.mesh.reason import generate, reason
 from epsmesh.mesh.size import Sizes, set_size_field
 from epsmesh.shapes.complex import OUTSIDE
 from epsmesh.shapes.frame import Frame
@@ -221,7 +221,7 @@ def _mesh_plane(bordered: Bordered, loops: list[list[int]], probe: Probe, sizes:
             mesh.setTransfiniteCurve(curve, 2)
         set_size_field(sizes, probe, Frame((0.0, 0.0, 0.0)), scale)
         try:
-            mesh.generate(2)
+            generate(2)
         except Exception as error:
             raise MeshError(f"gmsh: {reason(error)}") from error
         points, position = numbered_points()

@@ -11,7 +11,7 @@ from epsmesh.mesh.generate import MeshError, model_options
 from epsmesh.mesh.model_arrays import corners_of, numbered_points
 from epsmesh.mesh.organ.field import Field
 from epsmesh.mesh.organ.sheet import TangledError
-from epsmesh.mesh.reason import reason
+from epsmesh.mesh.reason import generate, reason
 from epsmesh.shapes.complex import Complex
 from epsmesh.shapes.skin import Skin
 from epsmesh.shapes.triangles import Triangles, enclosed, half_edges
@@ -68,7 +68,7 @@ def _fill(points: FloatArray, shells: list[IntArray], scale: float, field: Field
         field.set(scale, model.geo)
         gmsh.option.setNumber("Mesh.OptimizeThreshold", _OPTIMISED)
         try:
-            model.mesh.generate(3)
+            generate(3)
         except Exception as error:  # gmsh raises bare Exception
             raise _named(f"gmsh: {reason(error)}", scale) from error
         place, position = numbered_points()
