@@ -1,4 +1,4 @@
-"""Bodies that touch more than the tool: lift-off from a support, and two jaws."""
+"""Bodies that touch more than the tool: lift-off from a support, two jaws, and their slip when they are pulled."""
 
 from collections.abc import Iterator
 from math import pi, sqrt
@@ -18,6 +18,9 @@ _YOUNG, _POISSON = 10e3, 0.3
 _RECEDING = 5e-3
 # Of half of a body whose weight keeps it on a smooth plane: it bends the plane under the tool.
 _WEIGHT = 1e-3
+# Of jaws on a body that is no half-space; of the directions of friction, which differ a bit.
+_FINITE, _ALIGNED = 2e-2, 1e-3
+_FRICTION = 0.3
 _LIGHT = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
 
 
@@ -27,6 +30,7 @@ def contacts_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     if not quick:
         yield from _grasps(comm)
         yield _between_balls(comm)
+        yield from _pulled(comm)
 
 
 def _record(comm: MPI.Comm, body: Section, probe: Section | list[Section], mesh: Section, **more: Section) -> Record:
@@ -80,3 +84,18 @@ def _between_balls(comm: MPI.Comm) -> Row:
     force = 4 / 3 * modulus * found.contact_radius**3 / (1e-3 * radius)
     bar = 3 * found.contact_radius_error
     return Row("block between two balls, at the computed radius", "3D", force, "H. Hertz (1882)", found.force, bar)
+
+
+def _pulled(comm: MPI.Comm) -> Iterator[Row]:
+    """Two balls that are pulled until both contacts slide: the force, and the way of the one that slides last."""
+    probe = _jaws(_ball(5, 0.3) | {"friction": _FRICTION, "pull": "0.15 mm"})
+    probe[1]["depth"] = "0.2 mm"
+    found = _record(comm, box(60, 60, 40, "sides"), probe, _sizes(0.7, 10))
+    numbers = found.largest | {"force": found.force}
+    pull, press = (numbers[name] + numbers[f"jaw_{name}"] for name in ("pull_force", "force"))
+    bar = (numbers["pull_force_error"] + numbers["jaw_pull_force_error"]) / pull
+    name = "block between two balls that are pulled"
+    yield Row(f"{name}: F at whole slip", "3D", _FRICTION * press, known.COULOMB, pull, bar, _ALIGNED, found.message)
+    reference = known.slip_of_ball(_YOUNG, _POISSON, _FRICTION, found.force, found.contact_radius)
+    way, bar = numbers["slip_whole"], numbers["slip_whole_error"] / numbers["slip_whole"]
+    yield Row(f"{name}: pull at whole slip (m)", "3D", reference, known.MINDLIN, way, bar, _FINITE, found.message)

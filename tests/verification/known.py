@@ -60,6 +60,8 @@ BILODEAU = "G. G. Bilodeau, J. Appl. Mech. 59, 519 (1992)"
 SNEDDON = "I. N. Sneddon, Int. J. Eng. Sci. 3, 47 (1965)"
 KEER = "L. M. Keer, J. Dundurs and K. C. Tsai, J. Appl. Mech. 39, 1115 (1972): integral equation, solved anew"
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
+COULOMB = "C. A. Coulomb (1785)"
+MINDLIN = "R. D. Mindlin, J. Appl. Mech. 16, 259 (1949)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).
 _POINTS, _FARTHEST = 200, 20.0
@@ -228,6 +230,14 @@ def flat_punch(toughness: float) -> tuple[float, float]:
 
     found = minimize_scalar(pressure, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-9})
     return sqrt(found.x), float(found.fun)
+
+
+def slip_of_ball(young: float, poisson: float, friction: float, force: float, radius: float) -> float:
+    """Return the way (m) of a rigid ball along a half-space at which its whole contact slides (Mindlin).
+
+    3 (2 - ν) μ F / (16 G a), with the contact's ``radius`` a (m) at the normal ``force`` F (N).
+    """
+    return 3 * (2 - poisson) * friction * force / (16 * young / (2 * (1 + poisson)) * radius)
 
 
 def receding_radius() -> float:
