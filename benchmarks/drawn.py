@@ -52,7 +52,7 @@ _JAWS: tuple[Study, ...] = (
     {"shape": "wedge", "angle": "75 deg", "length": "8 mm", "tip": "1.5 mm"},
 )
 _PULLS = (0.02, 0.4)  # mm
-_BOTH = 2  # planes of symmetry of a body that a smooth contact holds along them
+_BOTH = {"x", "y"}  # planes of symmetry of a body that does not slide away along a smooth contact
 
 # What draws the scene of a seed: its study, whose files are in a folder, and its classes.
 Drawn = Callable[[int, Path], tuple[Study, dict[str, str]]]
@@ -153,7 +153,7 @@ def _slides_away(study: Study, folder: Path) -> bool:
     body, friction = study["body"], tools(study)[0].get("friction", 0)
     if body["fixed"] != "none" or (body["support"]["friction"] if "support" in body else friction):
         return False
-    return len(_first_solve(study, folder).mirrors) < _BOTH
+    return not {*_first_solve(study, folder).mirrors} >= _BOTH
 
 
 def _contacts(study: Study) -> dict[str, str]:
