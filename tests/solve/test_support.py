@@ -18,6 +18,8 @@ WEIGHT = DENSITY * 9.81 * 40e-3 * 40e-3 * 20e-3
 HEAVY = {"material": {"density": f"{DENSITY} kg/m^3"}, "load": GRAVITY}
 
 
+CYST_OF_TISSUE = {"name": "cyst", "at": ["0 mm", "0 mm", "-10 mm"], "radius": "3 mm", "young": "20 kPa", "poisson": 0.4}
+TAUT = {"young": "0.2 MPa", "thickness": "0.1 mm", "poisson": 0.4, "tension": "1 N/m"}
 CYST = {"name": "cyst", "file": "ball.stl", "unit": "mm", "hollow": True, "pressure": "0.5 kPa"}
 
 
@@ -86,6 +88,67 @@ def test_friction_of_the_support_is_between_none_and_sticking(material):
 
 
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
+def test_a_heavy_body_settles_with_friction_before_the_tool_comes(material):
+    material = material | {"density": f"{DENSITY} kg/m^3"}
+    smooth, least, some, most, stuck = (
+        one(probe=BALL, body=on(friction), material=material, load=GRAVITY)
+        for friction in (0, 1e-3, 0.05, 2.0, "stick")
+    )
+    assert smooth.force < some.force < stuck.force
+    assert least.force == pytest.approx(smooth.force, rel=1e-3)
+    assert most.force == pytest.approx(stuck.force, rel=1e-4)
+    for found in (least, some, most):
+        assert found.balance < 1e-7
+        assert found.largest["support_force"] == pytest.approx(found.force + WEIGHT, rel=1e-6)
+    slips = [found.largest["support_slip"] for found in (stuck, some, least, smooth)]
+    assert slips == sorted(slips)
+    assert slips[0] == 0.0
+    assert some.load_energy < smooth.load_energy  # friction spares the tissue a part of the work of its weight
+
+
+@pytest.mark.parametrize(("friction", "holds"), [(0.3, True), (0.1, False)])
+def test_a_body_slides_down_a_table_that_is_steeper_than_friction(friction, holds):
+    """Coulomb's: it slides where the tangent of the slope, here 0.123, is larger than the coefficient."""
+    slope = np.radians(7)
+    gravity = [f"{9.81 * np.sin(slope):.9g} m/s^2", "0 m/s^2", f"{-9.81 * np.cos(slope):.9g} m/s^2"]
+    found = one(probe=BALL, body=on(friction), material=HEAVY["material"], load={"gravity": gravity})
+    assert (found.status == "ok") == holds, found.message
+    if holds:
+        assert found.largest["support_force"] == pytest.approx(found.force + WEIGHT * np.cos(slope), rel=1e-6)
+    else:
+        assert "does not settle on its support" in found.message
+
+
+def test_friction_holds_a_heavy_body_that_is_pressed_beside_its_middle():
+    probe = BALL | {"at": ["6 mm", "0 mm"]}
+    some, stuck = (one(probe=probe, body=on(friction), **HEAVY) for friction in (0.3, "stick"))
+    assert some.status == "ok", some.message
+    assert 0.9 * stuck.force < some.force <= (1 + 1e-6) * stuck.force
+    assert some.largest["support_slip"] > stuck.largest["support_slip"] == 0.0
+    assert np.isnan(some.largest["support_slip_error"])
+    assert some.balance < 1e-7
+
+
+def test_tissue_that_is_pressed_from_above_slides_by_poissons_ratio():
+    """A uniform pressure on the top squeezes the body sideways by ν q / E, without friction and homogeneously."""
+    pressed = {"traction": [{"on": "top", "pressure": "0.2 kPa"}]}
+    found = one(probe=BALL | {"depth": "0.1 mm"}, body=on(), load=pressed)
+    assert found.largest["support_slip"] == pytest.approx(0.3 * 200 / 10e3 * np.hypot(20e-3, 20e-3), rel=3e-3)
+
+
+def test_steps_of_the_loads_are_in_the_error_bars():
+    """The path is followed in steps: with half of them, force and slip change by less than the bars."""
+    changes = {"probe": BALL, "body": on(0.05), **HEAVY}
+    found = one(**changes)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("epsmesh.solve.contact.large.LargeContact.STEPS", 32)
+        finer = one(**changes)
+    assert abs(finer.force - found.force) < found.force_error * found.force
+    for name in ("support_slip", "lift_off_area"):
+        assert abs(finer.largest[name] - found.largest[name]) <= found.largest[f"{name}_error"]
+
+
+@pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_tool_is_that_on_a_fixed_body(material):
     fixed, rests = (one(probe=BALL | {"friction": 0.3}, body=body, material=material) for body in ({}, on("stick")))
     # Both searches end where Coulomb's law holds within a tolerance, which is 1e-4 of F on some meshes.
@@ -138,12 +201,13 @@ def test_an_inclined_tool_that_lifts_nothing_presses_as_on_a_fixed_body():
     ("changes", "said"),
     [
         ({"body": on(), "probe": BALL | {"at": ["3 mm", "0 mm"]}}, "lets it move along x"),
+        ({"body": on(0.3), "probe": BALL | {"at": ["3 mm", "0 mm"]}}, "lets it move along x"),
         (
             {"body": on("stick"), "probe": BALL, **HEAVY, "load": {"gravity": ["0 m/s^2", "0 m/s^2", "9.81 m/s^2"]}},
             "does not settle on its support",
         ),
     ],
-    ids=["slides away", "falls up"],
+    ids=["slides away", "is not pressed on", "falls up"],
 )
 def test_a_body_that_floats_fails_with_what_does_not_hold_it(changes, said):
     found = one(**changes)
@@ -154,14 +218,20 @@ def test_a_body_that_floats_fails_with_what_does_not_hold_it(changes, said):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"body": on(0.3), **HEAVY}, 'must be 0 or "stick" with loads'),
+        (
+            {
+                "body": on(0.3, inclusion=[CYST_OF_TISSUE | {"capsule": TAUT}]),
+                "probe": BALL,
+            },
+            "with a capsule that is stretched before",
+        ),
         ({"body": on() | {"fixed": "bottom"}}, 'must be "none" with [body.support]'),
         ({"body": on(), "probe": {"contact": "bonded"}}, "found together"),
         ({"body": on("stick"), "probe": BALL | {"history": {"ramp": "1 s", "hold": "1 s"}}}, "lifts off no support"),
         ({"body": on("stick", region=[CYST])}, "does not press the body on"),
         ({"body": {"shape": "ellipsoid", "size": None, "axes": ["30 mm"] * 3} | on()}, "an ellipsoid has no support"),
     ],
-    ids=["number", "fixed", "bonded", "in time", "pressed within", "ellipsoid"],
+    ids=["stretched before", "fixed", "bonded", "in time", "pressed within", "ellipsoid"],
 )
 def test_what_is_not_computed_is_refused(changes, said, tmp_path, monkeypatch):
     points, facets = organs.sphere(8)

@@ -107,7 +107,7 @@ def body_planes(body: Body) -> tuple[str, ...]:
 
 def is_body_round(body: Body) -> bool:
     """Return whether a body with its support and inclusions is axisymmetric about z."""
-    return body.half_plane() is not None
+    return body.half_plane() is not None and (body.ground is None or body.ground.is_round)
 
 
 @lru_cache(_MANY)

@@ -56,8 +56,10 @@ def _has_slit(case: Case) -> bool:
 _COSTS = ("time_mesh", "time_assemble", "time_setup", "time_solve", "time_error", "time_total", "time_spread")
 _COUNTS = ("dofs", "cells", "iterations")
 _OF_SHAPE = ("unloading", "round_trip")
-_OF_REST = ("support_force", "support_force_error", "lift_off_area", "lift_off_area_error")
-_OF_LOOSE = ("interface_force", "interface_force_error", *_OF_REST[2:])
+_OF_REST = tuple(
+    f"{name}{bar}" for name in ("support_force", "lift_off_area", "support_slip") for bar in ("", "_error")
+)
+_OF_LOOSE = ("interface_force", "interface_force_error", *_OF_REST[2:4])
 _OF_JAW = ("jaw_force", "jaw_force_error", "jaw_contact_area", "jaw_contact_area_error")
 _OF_PULL = tuple(
     f"{name}{bar}"

@@ -201,6 +201,8 @@ def of_rest(solution: Solution) -> dict[str, float]:
         "support_force_error": sum(bar for _, bar in parts),
         "lift_off_area": rest.lifted,
         "lift_off_area_error": rest.bar * rest.area,
+        "support_slip": rest.slip,
+        "support_slip_error": rest.slip_bar,
     }
 
 

@@ -20,13 +20,14 @@ from epsmesh.scene.model import FIXED, JAW, LOOSE
 from epsmesh.shapes.contact import first_touch, normal_at_touch
 from epsmesh.shapes.distance import Distance
 from epsmesh.shapes.frame import Frame, Vector
+from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.tissue import FIBRE, Tissue
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.active_set import ContactError
-from epsmesh.solve.contact.bed import Bed, plane
+from epsmesh.solve.contact.bed import Bed, support_of
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.far_field import BodyField, PointForce
 from epsmesh.solve.history import Course
@@ -187,21 +188,20 @@ def beds_of(case: Case) -> tuple[Bed, ...]:
 
     It is its support, a second jaw, or the tissue below a loose layer.
     """
-    resting, turn = case.body.resting, case.frame.turn
-    turned, found = np.eye(3) if turn is None else turn, list[Bed]()
-    x, y, z = map(float, turned @ np.array([0.0, 0.0, 1.0]))
-
-    def level(height: float, friction: float, *, is_tissue: bool = False) -> Bed:
-        surface = plane(turned @ np.array([0.0, 0.0, height]), np.array([x, y, z]))
-        return Bed(surface, (x, y, z), friction, is_tissue=is_tissue)
-
-    if resting is not None:
-        found.append(level(case.body.heights[0], resting.friction))
+    resting, ground, turn = case.body.resting, case.body.ground, case.frame.turn
+    found = list[Bed]()
+    if resting is not None and ground is not None:
+        found.append(support_of(_turned(ground, turn), resting.friction))
     if case.jaw is not None:
         found.append(jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth))
     if (loose := case.body.loose) is not None:
-        found.append(level(loose.height, loose.friction, is_tissue=True))
+        level = Ground((0.0, 0.0, loose.height), (0.0, 0.0, 1.0))
+        found.append(replace(support_of(_turned(level, turn), loose.friction), is_tissue=True))
     return tuple(found)
+
+
+def _turned(ground: Ground, turn: FloatArray | None) -> Ground:
+    return ground if turn is None else ground.turned(turn)
 
 
 def jaw_at(jaw: Probe, frame: Frame, pace: float) -> Bed:
@@ -210,11 +210,11 @@ def jaw_at(jaw: Probe, frame: Frame, pace: float) -> Bed:
     return Bed(
         lambda points, depth: tool.distance(points, pace * depth),
         frame.axis,
-        tool.friction,
-        pace,
         tool.height,
-        tool.ends_at,
-        frame.point,
+        tool.friction,
+        pace=pace,
+        ends_at=tool.ends_at,
+        foot=frame.point,
     )
 
 

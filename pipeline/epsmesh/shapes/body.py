@@ -9,6 +9,7 @@ from epsmesh.arrays import FloatArray
 from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.closed import Closed
 from epsmesh.shapes.frame import Frame, Units, Vector
+from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.half_plane import HalfPlane
 from epsmesh.shapes.part import Around, is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Loose, Region
@@ -192,6 +193,11 @@ class Body(Section, ABC):
         """The layer that lies loose on the tissue below it; None if all are bonded."""
         return None
 
+    @property
+    def ground(self) -> Ground | None:
+        """The surface of that support."""
+        return None
+
     @kept
     def hold(self) -> Support:
         """The fixed part of its boundary, or the part that rests on a support that lets go."""
@@ -339,7 +345,7 @@ class Layered(Drawn):
     layer: Annotated[tuple[Layer, ...], Words("Layers of other materials, from the top down.", "[[body.layer]]")] = ()
     support: Annotated[
         Resting | None,
-        Words("Support that lets go: a rigid plane on which the body rests.", "[body.support]", default="none"),
+        Words("Support that lets go: a rigid surface on which the body rests.", "[body.support]", default="none"),
     ] = None
 
     @property
@@ -353,6 +359,16 @@ class Layered(Drawn):
         pairs = zip(range(len(self.layer)), self.layer, self.interfaces, strict=False)
         found = (Loose(n, end, layer.friction) for n, layer, end in pairs if layer.contact == "unilateral")
         return next(found, None)
+
+    @property
+    def ground(self) -> Ground | None:
+        """The surface of that support."""
+        return None if self.support is None else self.support.ground(self.heights[0], self.reach_below)
+
+    @abstractmethod
+    def reach_below(self, directions: FloatArray) -> float:
+        """Return the largest distance (m) of a point of the bottom from the z axis, in horizontal ``directions``
+        (n, 3), unit vectors."""
 
     @property
     def interfaces(self) -> tuple[float, ...]:

@@ -1,22 +1,49 @@
 """A support that lets go: a rigid surface on which a body rests, and off which it may lift."""
 
+from collections.abc import Callable
+from math import sqrt
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
+from epsmesh.arrays import FloatArray
 from epsmesh.shapes.friction import Friction
-from epsmesh.shapes.section import Section, Words
+from epsmesh.shapes.ground import Ground
+from epsmesh.shapes.section import Problems, Section, Words, in_mm
+from epsmesh.units import Length
+
+# Least radius of a hollow support, in units of the distance at which the body touches it: its wall is then inclined by
+# 30° to the bottom, and by 60° to the sides, which are not searched for contact.
+_WIDE = 2.0
+_PLANE = "plane"
 
 
 class Resting(Section):
-    """The table ``[body.support]``: the part of the boundary that rests on a rigid plane, and how it touches."""
+    """The table ``[body.support]``: the part of the boundary that rests on a rigid surface, and how it touches."""
 
     # Its own name begins the dimensions of its sweeps.
     name: Annotated[str, Field(exclude=True), Words("Name in dimensions of sweeps.", '"support"')] = "support"
     on: Annotated[
         Literal["bottom"],
-        Words("Part of the body that rests on a rigid plane: the bottom of a box or a cylinder.", '"bottom"'),
+        Words("Part of the body that rests on the support: the bottom of a box or a cylinder.", '"bottom"'),
     ]
+    shape: Annotated[
+        Literal["plane", "cylinder", "sphere"],
+        Words("Surface of the support. A cylinder is horizontal. Its middle is below that of the body.", '"cylinder"'),
+    ] = "plane"
+    radius: Annotated[
+        Length | None,
+        Words("Radius of a support that is a cylinder or a sphere.", '"60 mm"', default="none"),
+    ] = None
+    hollow: Annotated[
+        bool,
+        Words("Whether the body rests in the cylinder or sphere, as in a cradle, and not on it.", "true"),
+    ] = False
+    direction: Annotated[
+        tuple[float, float, float],
+        Words("Direction of the axis of a cylinder, along x or y: a vector of any length.", "[0.0, 1.0, 0.0]"),
+    ] = (1.0, 0.0, 0.0)
     contact: Annotated[
         Literal["unilateral"],
         Words("Contact: tissue presses on the support, and may lift off.", '"unilateral"'),
@@ -29,3 +56,50 @@ class Resting(Section):
             '[0.0, 0.3, "stick"]',
         ),
     ] = 0.0
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is a plane."""
+        return self.shape == _PLANE
+
+    @property
+    def across(self) -> tuple[tuple[float, float, float], ...]:
+        """The horizontal directions in which it is curved."""
+        along_x, along_y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+        match self.shape:
+            case "sphere":
+                return along_x, along_y
+            case "cylinder":
+                return (along_y if self.direction[0] else along_x,)
+        return ()
+
+    def ground(self, low: float, reach: Callable[[FloatArray], float]) -> Ground:
+        """Return its surface, which a body at rest touches with its bottom, at the height ``low`` (m).
+
+        ``reach`` is the largest distance (m) of a point of the bottom from the axis of the body, in the given
+        horizontal directions (n, 3).
+        """
+        if self.radius is None:
+            return Ground((0.0, 0.0, low), (0.0, 0.0, 1.0))
+        if self.hollow:
+            to_edge = reach(np.array(self.across))
+            low -= to_edge**2 / (self.radius + sqrt(self.radius**2 - to_edge**2))
+        return Ground((0.0, 0.0, low), (0.0, 0.0, 1.0), self.radius, self.across, self.hollow)
+
+    def check(self, reach: Callable[[FloatArray], float], problems: Problems) -> None:
+        """Report keys that its shape has not, or lacks, and a hollow support that is too narrow for a body."""
+        shape, is_round = self.shape, not self.is_flat
+        for key, has in (("radius", is_round), ("hollow", is_round), ("direction", shape == "cylinder")):
+            if key in self.model_fields_set and not has:
+                problems.error(f"body.support.{key}", getattr(self, key), f"a {shape} has no {key}: omit it")
+        if sum(map(bool, self.direction)) != 1 or self.direction[2]:
+            problems.error("body.support.direction", list(self.direction), "must be along x or y, such as [0, 1, 0]")
+        elif is_round and self.radius is None:
+            problems.error("body.support.radius", None, f"is required for a {shape}")
+        elif self.radius is not None and self.hollow and self.radius < (least := _WIDE * reach(np.array(self.across))):
+            problems.error(
+                "body.support.radius",
+                in_mm(self.radius),
+                f"must be at least {in_mm(least)}: the wall of a narrower one would touch the sides of the body, where "
+                "no contact is searched",
+            )

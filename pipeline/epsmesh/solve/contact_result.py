@@ -88,7 +88,8 @@ class RestResult:
     in contact, and the rest of what it may touch, which has ``lifted`` off (m²).
 
     ``normal`` (3) is the unit vector into the body. ``bar`` is the relative 95 % bar on the area, ``force_bar`` that on
-    the force of a jaw, NaN if unknown. ``torque`` (N m) is that of the tissue on a jaw with friction about its advance.
+    the force of a jaw, NaN if unknown. ``torque`` (N m) is that of the tissue on a jaw with friction about its advance,
+    ``slip`` (m) the largest distance by which tissue has gone along a support on which it is.
     """
 
     force: tuple[float, float, float]
@@ -99,6 +100,8 @@ class RestResult:
     force_bar: float = nan
     torque: float = nan
     torque_bar: float = nan
+    slip: float = nan
+    slip_bar: float = nan
 
     def with_least_bar(self, share: float) -> "RestResult":
         """Return it with relative bars on force and area of a jaw of at least ``share``."""

@@ -13,7 +13,8 @@ from epsmesh.solve.terms import product
 
 # Stiffness of a rigid motion that is free, in units of the largest: rounding.
 _FREE = 1e-9
-# What lets the body move, and what would not, where jaws hold it.
+# What lets the body move, and what would not, where a support or jaws hold it.
+_SUPPORT = "its support lets", 'give [body.support] friction = "stick"'
 _JAWS = "its jaws let", "fix its sides"
 
 
@@ -61,9 +62,7 @@ def check_hold(space: Any, beds: Sequence[tuple[FloatArray, bool]] = ()) -> None
     if not values[0] > _FREE * max(abs(values[-1]), size):
         free = [*motions][int(np.abs(vectors[:, 0]).argmax())]
         if rests:
-            what, hold = (
-                ("its support lets", 'give [body.support] friction = "stick"') if space.conditions.released else _JAWS
-            )
+            what, hold = _SUPPORT if space.conditions.released else _JAWS
             raise SolveError(
                 f"the body floats: {what} it {free}, and nothing else prevents that; {hold}, add a term of [load] that "
                 "prevents it, or place the tool in the planes of symmetry"

@@ -87,7 +87,7 @@ class HyperelasticBody:
         self._space, self._unit = elements.displacements, elements.unit(law)
         self.held = self._space.prescribed_owned
         self._forms = elements.large_forms(law, scaled=prestressed)
-        self._share = 1.0  # of terms and dead loads
+        self._share, self._share_of_loads = 1.0, 1.0  # of terms, and of dead loads
         self._loads: list[Term] = []
         self._imposed: list[Imposed] = []
         self._stack = ExitStack()
@@ -136,13 +136,15 @@ class HyperelasticBody:
     @property
     def _terms(self) -> list[tuple[float, Term]]:
         """All terms besides the law, each with its share."""
-        shared = [(self._share, term) for term in (*self._space.terms, *self._loads)]
+        shared = [(self._share, term) for term in self._space.terms]
+        shared += [(self._share_of_loads, term) for term in self._loads]
         return [*shared, *((1.0, term) for term in self._imposed)]
 
-    def carry(self, applied: Applied | None, share: float = 1.0) -> None:
-        """Let a ``share`` of dead loads, and of the terms of the space, act on the body from now on."""
+    def carry(self, applied: Applied | None, share: float = 1.0, *, of_terms: float | None = None) -> None:
+        """Let a ``share`` of dead loads act on the body from now on, and one of the terms of the space: the same."""
         self._loads = [] if applied is None else [DeadLoads(applied.forces, self._space.forms.displacement)]
-        self._share = self._tangent.share = share
+        self._share_of_loads, self._share = share, share if of_terms is None else of_terms
+        self._tangent.share = self._share
 
     def on_terms(self, state: PETSc.Vec) -> tuple[FloatArray, float]:
         """Return the sum (3) of the nodal forces (N) of all terms besides the law, and of their sizes; collective."""

@@ -88,7 +88,7 @@ class QuasiStaticProblem(Problem):
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
         beds = () if tool is None else tool.beds
-        check_hold(self.elements.displacements, [(np.array(bed.normal), bed.sticks) for bed in beds])
+        check_hold(self.elements.displacements, [(np.array(bed.normal), bed.drags or bed.sticks) for bed in beds])
         self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
         if tool is not None:
             self.constraint = ContactSearch(spaces, self.elements, tool, reuse=reuse, condense=condense)
@@ -314,9 +314,9 @@ def _with_bars(
 ) -> ContactResult:
     """Return a contact with its bars; the second jaw has those of the tool, ``relative`` on F, if it is its image."""
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
-    if contact.rest is not None:
-        bars = (finer.area_bar, float(relative[0])) if is_halved else (finer.rest_bar, finer.rest_force_bar)
-        found = replace(found, rest=replace(contact.rest, bar=bars[0], force_bar=bars[1]))
+    if (rest := contact.rest) is not None:
+        area, force = (finer.area_bar, float(relative[0])) if is_halved else (finer.rest_bar, finer.rest_force_bar)
+        found = replace(found, rest=replace(rest, bar=area, force_bar=force, slip_bar=finer.rest_slip_bar))
     if finer.pull is not None:
         found = replace(found, pull=finer.pull)
     if contact.rubbing is None or finer.relative is None:

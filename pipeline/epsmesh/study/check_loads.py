@@ -5,7 +5,7 @@ from itertools import product
 from math import dist, inf
 from typing import cast
 
-from epsmesh.shapes.body import Body
+from epsmesh.shapes.body import Body, Layered
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.friction import STICK
 from epsmesh.shapes.from_file import FromFile
@@ -81,7 +81,9 @@ def _check_capsules(body: Body, problems: Problems) -> None:
 
 
 def _check_rest(body: Body, problems: Problems) -> None:
-    """Report a body that is fixed as well as it rests on a support that lets go."""
+    """Report a body that is fixed as well as it rests on a support that lets go, and one that this does not fit."""
+    if isinstance(body, Layered) and body.support is not None:
+        body.support.check(body.reach_below, problems)
     if body.resting is not None and body.fixed != NONE:
         held = 'must be "none" with [body.support]: the part that rests on it is not fixed, nor is another'
         problems.error("body.fixed", body.model_dump()["fixed"], held)

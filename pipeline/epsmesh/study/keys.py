@@ -43,9 +43,9 @@ _TEXTS = {
     "layers, or other regions; labels may touch each other and the surface. Optional; every value can be swept.",
     "body.capsule": "Capsule: a thin elastic membrane on the body's surface, which bears tension along it and does not "
     "bend; that of a region is [body.inclusion.capsule] or [body.region.capsule]. Optional; every value can be swept.",
-    "body.support": 'Support that lets go, in place of `fixed`, which is then "none": a rigid plane on which the body '
-    "rests, and off which it may lift. Loads press it on before the tool touches it. Optional; every value can be "
-    "swept.",
+    "body.support": 'Support that lets go, in place of `fixed`, which is then "none": a rigid plane, cylinder or '
+    "sphere on which the body rests, and off which it may lift. Loads press it on before the tool touches it. "
+    "Optional; every value can be swept.",
     "material": "Material of all tissue outside layers, inclusions and regions: isotropic, and elastic or "
     "relaxing. Omit it if layers fill the body.",
     "material.relaxation": "Relaxation over time: terms of a Prony series, one table each. `young` is then the "

@@ -38,7 +38,7 @@ def tool_of(fields: Fields) -> Tool:
     parts = [_tool(fields, case.probe, PROBE)]
     if case.jaw is not None:
         parts.append(_tool(fields, case.jaw, JAW))
-    if case.body.resting is not None:
+    if (rest := case.body.resting) is not None and rest.is_flat:
         parts.append(_plane_below(fields))
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     return Tool(

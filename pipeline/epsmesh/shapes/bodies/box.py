@@ -93,6 +93,10 @@ class Box(Layered):
         """Return the distance (m) of the farthest vertical edge."""
         return hypot(self.size[0] / 2 + abs(x), self.size[1] / 2 + abs(y))
 
+    def reach_below(self, directions: FloatArray) -> float:
+        """Return the distance (m) of a corner."""
+        return float(np.linalg.norm(self.corners @ directions.T, axis=1).max())
+
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points to the nearest face, negative outside."""
         x, y, z = points.T

@@ -96,6 +96,10 @@ class Cylinder(Layered):
         """Return the distance (m) of the far side."""
         return self.radius + hypot(x, y)
 
+    def reach_below(self, directions: FloatArray) -> float:
+        """Return the radius."""
+        return self.radius
+
     def inside(self, points: FloatArray) -> FloatArray:
         """Return the distance (m) of points to the nearest face, negative outside."""
         x, y, z = points.T

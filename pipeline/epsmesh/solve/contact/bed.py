@@ -12,26 +12,30 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
+from epsmesh.shapes.ground import Ground
 
 
 @dataclass(frozen=True)
 class Bed:
     """A rigid surface by its ``distance`` from points (n, 3), m, where the tool is at a depth (m) from its first touch.
 
-    The body at rest touches it. On it tissue has Coulomb's coefficient ``friction``; a support of infinite friction
-    holds what touches it from the beginning. ``normal`` is the unit vector from the bed into the body, in the mean.
+    The body at rest touches it. ``height`` are its heights (m) at rest above points (n, 3) of the undeformed surface,
+    along its axis, ``normal``: the unit vector from the bed into the body, in the mean. On it tissue has Coulomb's
+    coefficient ``friction``. ``sticks`` says that tissue which touches it is held where that was at rest, without a
+    path of friction. A plane ``is_flat``.
 
-    A jaw advances along its normal by ``pace`` times the tool's depth. ``height`` are its heights (m) at rest above
-    points (n, 3) of the undeformed surface, along its axis; ``ends_at`` is a mask of points (n, 3) on the edge of its
-    candidates: true where it ends itself. Both are None for a support. ``foot`` (m) is on a jaw's axis.
-    ``is_tissue``: it is the tissue below a loose layer, whose displacements are those relative to it.
+    It is a support, or a jaw that has an edge: ``ends_at`` is a mask of points (n, 3) on the edge of its candidates,
+    true where it ends itself. A jaw advances along its normal by ``pace`` times the tool's depth; ``foot`` (m) is on
+    its axis. ``is_tissue``: it is the tissue below a loose layer, whose displacements are those relative to it.
     """
 
     distance: Callable[[FloatArray, float], Distance]
     normal: tuple[float, float, float]
+    height: Callable[[FloatArray], FloatArray]
     friction: float = 0.0
+    sticks: bool = False
+    is_flat: bool = True
     pace: float = 0.0
-    height: Callable[[FloatArray], FloatArray] | None = None
     ends_at: Callable[[FloatArray], BoolArray] | None = None
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_tissue: bool = False
@@ -39,12 +43,12 @@ class Bed:
     @property
     def is_support(self) -> bool:
         """Whether the body rests on it before the tool comes."""
-        return self.height is None
+        return self.ends_at is None
 
     @property
-    def sticks(self) -> bool:
-        """Whether it is a support that holds what touches it."""
-        return self.is_support and self.friction == inf
+    def drags(self) -> bool:
+        """Whether it is a support along which friction holds the body."""
+        return self.is_support and self.friction > 0 and not self.is_tissue
 
     @property
     def advance(self) -> FloatArray:
@@ -52,56 +56,44 @@ class Bed:
         return self.pace * np.array(self.normal)
 
     def at_rest(self, places: FloatArray) -> "Bed":
-        """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along normals there.
+        """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along its axis."""
+        heights, outward = self.height(places), -np.array(self.normal)
+        return replace(
+            self,
+            distance=lambda points, depth: Distance.along(outward, heights - self.pace * depth, points - places),
+        )
 
-        Those of a jaw are along its axis.
-        """
-        if self.height is not None:
-            heights, outward = self.height(places), -np.array(self.normal)
-            return replace(
-                self,
-                distance=lambda points, depth: Distance.along(outward, heights - self.pace * depth, points - places),
-            )
-        found = self.distance(places, 0.0)
-        flat = np.zeros_like(found.curvature)
-
-        def distance(points: FloatArray, _: float) -> Distance:
-            moved = np.einsum("ni,ni->n", points - places, found.normal)
-            return Distance(found.gap + moved, found.normal, flat)
-
-        return replace(self, distance=distance)
+    def holding(self) -> "Bed":
+        """Return the support to which tissue sticks wherever it touches, without a path; a jaw as it is."""
+        return replace(self, friction=inf, sticks=True) if self.drags else self
 
     def moved(self, by: FloatArray) -> "Bed":
         """Return the jaw elsewhere, ``by`` (3), m."""
-        height, ends_at = self.height, self.ends_at
-        assert height is not None and ends_at is not None
+        ends_at = self.ends_at
+        assert ends_at is not None
         x, y, z = map(float, np.array(self.foot) + by)
         return replace(
             self,
             distance=lambda points, depth: self.distance(points - by, depth),
-            height=lambda points: height(points - by),
+            height=lambda points: self.height(points - by),
             ends_at=lambda points: ends_at(points - by),
             foot=(x, y, z),
         )
 
     def advanced(self, change: float) -> "Bed":
         """Return the bed where the tool is farther by ``change`` (m)."""
-        height = self.height
         return replace(
             self,
             distance=lambda points, depth: self.distance(points, depth + change),
-            height=None if height is None else lambda points: height(points) - self.pace * change,
+            height=lambda points: self.height(points) - self.pace * change,
         )
 
 
-def plane(point: FloatArray, normal: FloatArray) -> Callable[[FloatArray, float], Distance]:
-    """Return the distance to a half-space that ends at a ``point`` (3), m, with the outward unit ``normal`` (3)."""
-
-    def distance(points: FloatArray, _: float) -> Distance:
-        flat = np.zeros((*points.shape, points.shape[1]))
-        return Distance((points - point) @ normal, np.tile(normal, (len(points), 1)), flat)
-
-    return distance
+def support_of(ground: Ground, friction: float) -> Bed:
+    """Return the support whose surface is the ``ground``. A plane is touched at rest, where tissue then sticks."""
+    is_flat = not ground.across
+    sticks = is_flat and friction == inf
+    return Bed(lambda points, _: ground.distance(points), ground.normal, ground.height, friction, sticks, is_flat)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +101,8 @@ class Resting:
     """The ``nodes`` (n) above beds, among all that may be touched; those that touch at the start of a path, ``begin``.
 
     In a loop without friction, those that ``stick`` (n) are held at ``anchors`` (n, 3), m, where they touch. ``jaws``
-    are masks (n) of those of each second jaw; ``floats`` says that nothing holds the body but the tool and these.
+    are masks (n) of those of each second jaw. Of ``holds`` (n), masks, each has a node that touches, or the body
+    floats: nothing else holds it.
     """
 
     nodes: BoolArray
@@ -117,4 +110,4 @@ class Resting:
     stick: BoolArray
     anchors: FloatArray
     jaws: tuple[BoolArray, ...] = ()
-    floats: bool = False
+    holds: tuple[BoolArray, ...] = ()

@@ -191,13 +191,12 @@ def reach_contact_with_friction(
     """
     iterations = 0
     for number in range(1, steps + 1):
-        amount = depth * (number / steps) ** 2
-        if path.last.touched is None:
-            tissue.state = path.last.state
-            nothing, tool = np.zeros(len(tissue.fixed), dtype=bool), tool_at(amount)
-            if number < steps and not tool.touches(first_set(tissue, tool, nothing)):
-                path.add(ContactPathPoint(amount, path.last.state))
-                continue
+        amount, last = depth * (number / steps) ** 2, path.last
+        tissue.state, tool = last.state, tool_at(amount)
+        before = tool.start() if last.touched is None else last.touched.active
+        if number < steps and not tool.touches(first_set(tissue, tool, before)):
+            path.add(ContactPathPoint(amount, last.state, last.touched))
+            continue
         path.step = inf
         try:
             iterations += reach_contact(tissue, tool_at, path, amount, friction)

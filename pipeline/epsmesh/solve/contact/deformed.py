@@ -149,7 +149,7 @@ class _InContact(Newton[ContactSolution]):
             self._refuted.add(before.tobytes())
         self._active = active = self._with_care(before, following)
         if self._floats:
-            raise NoTouchError("a jaw does not touch a single node: use smaller elements below it")
+            raise NoTouchError("a jaw, or a support, does not touch a single node: use smaller elements next to it")
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
         # A rough solution has the next set: forces of nodes that leave it are residuals.
         pressing = before & active if is_rough else before
@@ -180,7 +180,7 @@ class _InContact(Newton[ContactSolution]):
         constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
         resting = self._tool.resting
         if resting is not None:
-            constraint = replace(constraint, resting=resting.nodes, floats=resting.floats)
+            constraint = replace(constraint, resting=resting.nodes, floats=bool(resting.holds))
         constraint = replace(constraint, is_there=self._is_closed)
         if self._friction is not None:
             constraint = self._friction.constrain(constraint, self._there, active)
@@ -277,9 +277,9 @@ class _InContact(Newton[ContactSolution]):
 
     @property
     def _floats(self) -> bool:
-        """Whether nothing would hold the body in the next step: one of its jaws touches no node."""
+        """Whether nothing would hold the body in the next step: a jaw or a support touches no node."""
         resting = self._tool.resting
-        return resting is not None and resting.floats and not self._tool.touches(self._active)
+        return resting is not None and not all(bool((self._active & own).any()) for own in resting.holds)
 
     @property
     def _is_closed(self) -> bool:

@@ -124,11 +124,11 @@ def contact_area(
     pressure = np.maximum(-reactions[near], 0.0) / weights[near] * within
     gap = np.maximum(touched.gap[near], 0.0) * ~within
     force, width = -float(reactions[active].sum()), _WIDTH * candidates.widths[near]
-    semi_axis = _semi_axis(candidates.points[:, :2], -np.where(active, reactions, 0.0), mirrored)
+    of_contact = semi_axis(candidates.points[:, :2], -np.where(active, reactions, 0.0), mirrored)
     inner = sure - float(weights[near][within].sum())
     area = sure or float(weights[near].sum())
     for _ in range(_MOST_ROUNDS):
-        intensity = _INTENSITY * force / area * np.sqrt(2 / max(semi_axis, float(width.min())))
+        intensity = _INTENSITY * force / area * np.sqrt(2 / max(of_contact, float(width.min())))
         inside = (pressure / intensity) ** 2 - (0.75 * modulus[near] * gap / intensity) ** (2 / 3)
         found = inner + float(weights[near] @ np.clip(0.5 + inside / width, 0.0, 1.0))
         if abs(found - area) <= _SMALL * area:
@@ -137,7 +137,7 @@ def contact_area(
     return Area(area, fitted.AREA * float(weights[near].sum()) / area)
 
 
-def _semi_axis(points: FloatArray, load: FloatArray, mirrored: tuple[int, ...]) -> float:
+def semi_axis(points: FloatArray, load: FloatArray, mirrored: tuple[int, ...]) -> float:
     """Return the smaller semi-axis (m) of the elliptic contact of a ball with the moments of ``load``."""
     points = points - np.where(np.isin([0, 1], mirrored), 0.0, load @ points / load.sum())
     moments = (points * load[:, None]).T @ points / load.sum()

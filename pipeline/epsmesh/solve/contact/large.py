@@ -13,8 +13,8 @@ steps, and again in half as many: the change of the force is the bar of the step
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from math import nan
+from functools import cached_property, partial
+from math import isnan, nan
 from typing import ClassVar
 
 import numpy as np
@@ -42,6 +42,7 @@ from epsmesh.solve.contact.pull import STEPS as PULL_STEPS
 from epsmesh.solve.contact.pull import Pull, force_across, pull_jaws, with_bars
 from epsmesh.solve.contact.rest import Rest, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
+from epsmesh.solve.contact.settle import without_friction
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -61,6 +62,8 @@ from epsmesh.stages import stage
 _SMALL = 1e-4
 # Residual and gaps of one degree more, for the error bar.
 _FOUND_AGAIN = 1e-3
+# Load steps of the tool for one of the loads, under which a body settles with friction.
+_OF_SETTLING = 2
 # Share of the depth to both sides of it over which the rate by the depth is taken.
 _NEARBY = 1e-3
 
@@ -78,8 +81,11 @@ class LargeContact:
         """Prepare for law and loads of a request."""
         self._surface, self._elements, self._tool = surface, elements, tool
         self._law, self._loads = asked.law, asked.movement.loads
+        space, is_loaded = elements.displacements, self._loads is not None
+        self._smooth = without_friction(space, tool, is_loaded=is_loaded) if tool.rubs else tool
         self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
         self._sagged: Sagged | None = None
+        self._settled = dict[int, Sagged]()  # with friction, by the number of load steps
         self._path: ContactPath | None = None
         self._corrections = Corrections()
 
@@ -109,8 +115,8 @@ class LargeContact:
         (depth,) = asked.movement.amounts
         body = DeformedBody(self._elements, self._surface, self._law, asked.method, stack, self._applied)
         if self._sagged is None:
-            self._sagged = sagged_body(body, self._tool, self._loads)
-        tool = self._sagged.placed(self._tool, body)
+            self._sagged = sagged_body(body, self._smooth, self._loads)
+        tool = self._sagged.placed(self._smooth, body)
         if self._path is None:
             self._path = ContactPath(ContactPathPoint(0.0, self._sagged.state))
         try:
@@ -121,21 +127,22 @@ class LargeContact:
         assert touched is not None
         body.state = self._path.last.state
         return LargeContactSolution(
-            self._surface, body, self._tool, touched, depth, self._sagged, self._corrections
+            self._surface, body, self._smooth, touched, depth, self._sagged, self._corrections
         ), iterations
 
     def _with_friction(self, smooth: "LargeContactSolution") -> "tuple[LargeContactSolution, int]":
         """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
-        body, depth, state, tool = smooth.body, smooth.depth, smooth.body.state, smooth.placed
+        body, depth, state = smooth.body, smooth.depth, smooth.body.state
         friction = Friction.on(body, self._tool, depth)
         found, iterations = list[ContactSolution](), 0
-        pulls = list[Pull]()
+        pulls, rests = list[Pull](), list[tuple[Rest, ...]]()
         for share in (2, 1):
-            path = ContactPath(ContactPathPoint(0.0, smooth.sagged.state))
+            sagged = self._settled_with_friction(smooth, friction, self.STEPS // share)
+            tool = sagged.placed(self._tool, body)
+            path = ContactPath(ContactPathPoint(0.0, sagged.state, sagged.touched))
             try:
-                iterations += reach_contact_with_friction(
-                    body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, self.STEPS // share
-                )
+                above, steps = partial(placed_tool, body, tool), self.STEPS // share
+                iterations += reach_contact_with_friction(body, above, path, depth, friction, steps)
             except LargeError as error:
                 raise stopped(body, path, depth, error, self._tool.friction) from error
             touched = path.last.touched
@@ -146,12 +153,24 @@ class LargeContact:
                 touched = pulls[-1].end.touched
                 iterations += sum(step.touched.iterations for step in pulls[-1].steps[1:])
             found.append(touched)
+            rests.append(rests_of(body, self._tool.beds, touched))
         coarse, fine = found
-        beside = Beside(smooth, state, coarse)
-        if not pulls:
-            return replace(smooth, touched=fine, beside=beside), iterations
-        there = self._tool if self._law.is_linear else self._tool.moved(np.array(tool.pull))
-        return replace(smooth, tool=there, touched=fine, beside=replace(beside, pulls=tuple(pulls))), iterations
+        beside = Beside(smooth, state, coarse, rests[0], tuple(pulls))
+        is_moved = tool.pull is not None and not self._law.is_linear
+        there = self._tool.moved(np.array(tool.pull)) if is_moved else self._tool
+        return replace(smooth, tool=there, touched=fine, sagged=sagged, beside=beside), iterations
+
+    def _settled_with_friction(self, smooth: "LargeContactSolution", friction: Friction, steps: int) -> Sagged:
+        """Return the body under its loads before the tool touches it, where the path of the tool has so many ``steps``.
+
+        Loads are followed in half as many: what presses a body on mostly does so everywhere in proportion.
+        """
+        if isnan(smooth.sagged.sag) or not self._tool.drags:
+            return smooth.sagged
+        if steps not in self._settled:
+            fewest = steps // _OF_SETTLING
+            self._settled[steps] = sagged_body(smooth.body, self._tool, self._loads, friction=friction, steps=fewest)
+        return self._settled[steps]
 
 
 def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError, friction: float = 0.0) -> LargeError:
@@ -165,12 +184,13 @@ def stopped(body: DeformedBody, path: ContactPath, depth: float, why: LargeError
 class Beside:
     """Beside contact with friction: that without, ``smooth``, with its ``state``; and the one from half the steps.
 
-    ``pulls`` are those in half the steps, and in all, of jaws that are pulled.
+    ``rests`` is what beds do there. ``pulls`` are those in half the steps, and in all, of jaws that are pulled.
     """
 
     smooth: "LargeContactSolution"
     state: FloatArray
     coarse: ContactSolution
+    rests: tuple[Rest, ...] = ()
     pulls: tuple[Pull, ...] = ()
 
 
@@ -276,6 +296,8 @@ class LargeContactSolution:
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
             self.body.state = state
             found = half_the_steps(found, self.surface_contact, smooth.force)
+            if self.rests and self.rests[0].bed.is_support:
+                return self.rests[0].half_the_steps(found, self.beside.rests[0], smooth.rests[0])
             if not self.beside.pulls:
                 return found
             above = (self.body, self.surface, self.beside.smooth.tool, self.depth, LargeContact.STEPS // 2)
@@ -289,6 +311,9 @@ class LargeContactSolution:
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])
         least = fitted.AT_EDGE_LARGE[self.body.elements.degree]
         decrement, bar = found_again_bar(share, at_edge, least, at_end=here.at_sharp_end)
+        bar = max([bar, *(rest.unresolved for rest in self.rests)])
+        if any(rest.unresolved > fitted.MOST_UNRESOLVED for rest in self.rests):
+            raise LargeError("the contact with the support is smaller than elements there: use a smaller `fine`")
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
@@ -300,6 +325,7 @@ class LargeContactSolution:
             found,
             rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1),
             rest_force_bar=rest.force_bar(again, self.body.elements.degree),
+            rest_slip_bar=bar * rest.slip + abs(again.slip - rest.slip),
         )
 
     def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:

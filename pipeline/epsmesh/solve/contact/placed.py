@@ -10,6 +10,9 @@ from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 
+# Height below which nodes of a support touch it at first, in units of the depth.
+_NEXT = 0.5
+
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
     """Return the tool at a ``depth`` (m), and the beds of the body, above the candidates of a body.
@@ -41,7 +44,7 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
     beds = tool.beds
     if body.law.is_linear:
         beds = tuple(bed.at_rest(body.part(n).candidates.points) for n, bed in enumerate(tool.beds, start=1))
-    return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool))
+    return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool, depth))
 
 
 def check_edges(body: DeformedBody, tool: Tool, touched: ContactSolution) -> None:
@@ -56,14 +59,19 @@ def check_edges(body: DeformedBody, tool: Tool, touched: ContactSolution) -> Non
             check_edge(ends_at, part.candidates, part.of(touched.active))
 
 
-def _resting(body: DeformedBody, tool: Tool) -> Resting:
-    """Return the nodes on the beds of a ``tool``; without an earlier contact, all of them on a support touch."""
+def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
+    """Return the nodes on the beds of a ``tool`` at a ``depth`` (m); without an earlier contact, those touch that are
+    next to a support."""
     count = len(body.candidates)
     nodes, stick, begin = (np.zeros(count, dtype=bool) for _ in range(3))
+    supports, jaws = list[BoolArray](), list[BoolArray]()
     for number, bed in enumerate(tool.beds, start=1):
-        nodes[body.part(number).nodes] = True
-        stick[body.part(number).nodes] = bed.sticks
-        begin[body.part(number).nodes] = bed.is_support
-    jaws = tuple(body.part(n).mask(count) for n, bed in enumerate(tool.beds, start=1) if not bed.is_support)
+        part = body.part(number)
+        (supports if bed.is_support else jaws).append(part.mask(count))
+        nodes[part.nodes], stick[part.nodes] = True, bed.sticks
+        if bed.is_support:
+            heights = bed.height(part.candidates.points)
+            begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth
+    holds = () if body.is_held else (*supports, *((*jaws, ~nodes) if jaws else ()))
     begin = begin if tool.begins is None else tool.begins
-    return Resting(nodes, begin, stick, body.places, jaws, bool(jaws) and not body.is_held)
+    return Resting(nodes, begin, stick, body.places, tuple(jaws), holds)

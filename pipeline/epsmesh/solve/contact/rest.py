@@ -10,20 +10,25 @@ import numpy as np
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.bed import Bed
-from epsmesh.solve.contact.geometry import Area, contact_area
+from epsmesh.solve.contact.geometry import Area, contact_area, semi_axis
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.contact_result import RestResult
-from epsmesh.solve.estimate import found_again_bar
+from epsmesh.solve.elements.base import HierarchicalEstimate
+from epsmesh.solve.estimate import found_again_bar, unresolved
 from epsmesh.solve.response import whole_force
+
+# The square of the edge of an equilateral facet, in units of its area.
+_OF_FACET = 4 / 3**0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Rest:
     """A ``bed`` that has ``touched`` its ``candidates``; ``modulus`` (n) is E / (1 - ν²) of the tissue there (Pa).
 
+    ``moved`` (n, 3), m, are the displacements of its nodes.
     Points and forces are those of the modelled part, bounded by planes of symmetry normal to the axes ``mirrored``.
     """
 
@@ -31,6 +36,7 @@ class Rest:
     candidates: Candidates
     touched: ContactSolution
     modulus: FloatArray
+    moved: FloatArray
     mirrored: tuple[int, ...]
 
     @property
@@ -39,14 +45,19 @@ class Rest:
         return np.asarray(self.touched.forces.sum(axis=0))
 
     @cached_property
+    def _in_its_plane(self) -> "Rest":
+        """It with the axes of the bed, as those of a tool that presses along the last one."""
+        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
+        axes[-1] *= -1.0
+        candidates = replace(self.candidates, points=self.candidates.points @ axes.T)
+        return replace(self, candidates=candidates, touched=replace(self.touched, forces=self.touched.forces @ axes.T))
+
+    @cached_property
     def area(self) -> Area:
         """The area in contact, in the plane of the bed, with the bar by the size of elements at its edge."""
-        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
-        axes[-1] *= -1.0  # as a tool that presses along its last axis
-        seen = replace(self.candidates, points=self.candidates.points @ axes.T)
-        touched = replace(self.touched, forces=self.touched.forces @ axes.T)
-        found = contact_area(seen, touched, self.modulus, self.mirrored)
-        return replace(found, value=min(found.value, float(seen.areas.sum())))
+        seen = self._in_its_plane
+        found = contact_area(seen.candidates, seen.touched, self.modulus, self.mirrored)
+        return replace(found, value=min(found.value, float(seen.candidates.areas.sum())))
 
     @property
     def bar(self) -> float:
@@ -55,10 +66,33 @@ class Rest:
         return self.area.bar + float(np.abs(self.candidates.weights[unsure]).sum()) / self.area.value
 
     @property
+    def unresolved(self) -> float:
+        """The least relative bar on F: zero, but for contact with a support with elements larger than itself."""
+        if not self.bed.is_support or self.bed.is_tissue:
+            return 0.0
+        seen, active = self._in_its_plane, self.touched.active
+        pressed = np.where(active, -seen.touched.forces[:, -1], 0.0)
+        half = semi_axis(seen.candidates.points[:, :2], pressed, self.mirrored)
+        facets = seen.candidates.areas[active[seen.candidates.facets].any(axis=1)]
+        return unresolved(float(np.sqrt(_OF_FACET * facets.mean())) / half) if half else 1.0
+
+    @property
+    def slip(self) -> float:
+        """The largest distance (m) by which a node in contact has gone along the bed, from where it was at rest.
+
+        It is unknown on a round bed, which nodes meet on their way.
+        """
+        if self.bed.sticks or not self.bed.is_flat:
+            return 0.0 if self.bed.is_flat else nan
+        normal = self.touched.normal[self.touched.active]
+        moved = self.moved[self.touched.active]
+        along = moved - np.einsum("ni,ni->n", moved, normal)[:, None] * normal
+        return float(np.linalg.norm(along, axis=1).max(initial=0.0))
+
+    @property
     def whole_area(self) -> float:
         """The area (m²) of the modelled part that the bed may touch."""
-        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
-        return float(replace(self.candidates, points=self.candidates.points @ axes.T).areas.sum())
+        return float(self._in_its_plane.candidates.areas.sum())
 
     def result(self) -> RestResult:
         """Return that of the whole body."""
@@ -69,6 +103,7 @@ class Rest:
             normal=self.bed.normal,
             area=whole * self.area.value,
             lifted=whole * max(self.whole_area - self.area.value, 0.0),
+            slip=self.slip if self.bed.is_support else nan,
         )
         if self.bed.is_support or not self.bed.friction:
             return found
@@ -88,6 +123,16 @@ class Rest:
             return nan
         return found_again_bar(1 - finer.pressed / self.pressed, self.area.bar, fitted.AT_EDGE_LARGE[degree])[1]
 
+    def half_the_steps(self, found: HierarchicalEstimate, coarse: "Rest", smooth: "Rest") -> HierarchicalEstimate:
+        """Return the estimate ``found`` beside this support's friction, with the bars of that.
+
+        They are the changes from half as many load steps, ``coarse``. The relative bar on slip is that of the contact
+        beside, ``smooth``, unknown if the support sticks there.
+        """
+        of_area, of_slip = abs(coarse.area.value / self.area.value - 1), abs(coarse.slip - self.slip)
+        of_mesh = found.rest_slip_bar / smooth.slip if smooth.slip else 0.0 if self.bed.sticks else nan
+        return replace(found, rest_bar=found.rest_bar + of_area, rest_slip_bar=of_mesh * self.slip + of_slip)
+
 
 def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> tuple[Rest, ...]:
     """Return what the ``beds`` of a ``body`` do, from what has ``touched`` all of its candidates."""
@@ -97,6 +142,6 @@ def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) 
         candidates = part.candidates
         if not body.law.is_linear:
             candidates = replace(candidates, points=part.of(body.positions()))
-        modulus = candidates.from_regions(body.law.plane_moduli)
-        found.append(Rest(bed, candidates, part.solution(touched), modulus, body.elements.body.mirrored))
+        modulus, moved = candidates.from_regions(body.law.plane_moduli), part.of(body.positions() - body.places)
+        found.append(Rest(bed, candidates, part.solution(touched), modulus, moved, body.elements.body.mirrored))
     return tuple(found)

@@ -9,10 +9,12 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve import SolveError
+from epsmesh.solve.contact.contact_steps import Friction
 from epsmesh.solve.contact.geometry import Touch
 from epsmesh.solve.contact.settle import settle
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
+from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.dead_loads import sag
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.movement import Loads
@@ -28,7 +30,7 @@ class Sagged:
 
     ``sag`` (m) is how much farther the tool moves to the first touch, ``stored`` (J) the strain energy; both NaN
     without loads. Energies are those of the modelled part. ``begins`` (n) are the nodes that then rest on a bed, None
-    for all.
+    for all next to one. ``touched`` is the contact with beds that have dragged it, None without friction.
     """
 
     state: FloatArray
@@ -37,6 +39,7 @@ class Sagged:
     stored: float = np.nan
     sag: float = np.nan
     begins: BoolArray | None = None
+    touched: ContactSolution | None = None
 
     def placed(self, tool: Tool, body: DeformedBody) -> Tool:
         """Return a tool whose depths count from the first touch of the sagged surface of a ``body``.
@@ -51,20 +54,28 @@ class Sagged:
 
 
 def sagged_body(
-    body: DeformedBody, tool: Tool, loads: Loads | None, guess: FloatArray | None = None, *, has_crept: bool = False
+    body: DeformedBody,
+    tool: Tool,
+    loads: Loads | None,
+    guess: FloatArray | None = None,
+    *,
+    has_crept: bool = False,
+    friction: Friction | None = None,
+    steps: int = 1,
 ) -> Sagged:
     """Return a body under its loads, whose state is then that; ``guess`` is an initial guess of it; collective.
 
     ``has_crept``: relaxing tissue has carried them for long, and the energy of the ``body`` is then what is left.
+    ``friction`` is that with which it settles on beds, in so many ``steps`` at least.
 
     Raises:
         SolveError: see :func:`epsmesh.solve.dead_loads.sag`.
     """
     if loads is None and not body.elements.displacements.is_loaded:
         return Sagged(np.zeros(body.elements.unknowns))
-    begins = None
+    settled = None
     if tool.beds:
-        begins = settle(body, tool, guess).active
+        settled = settle(body, tool, guess, friction, steps)
     else:
         body.state = sag(body.elements, body.law, loads, guess, has_crept=has_crept)
     if has_crept:
@@ -76,7 +87,8 @@ def sagged_body(
         energy,
         energy + body.work_of_loads,
         _sag_of(tool, body),
-        begins,
+        None if settled is None else settled.active,
+        None if friction is None else settled,
     )
 
 

@@ -52,6 +52,11 @@ class Tool:
         """Whether it, or what touches the body besides, has friction; a support that only sticks has none here."""
         return self.friction > 0 or any(bed.friction > 0 and not bed.sticks for bed in self.beds)
 
+    @property
+    def drags(self) -> bool:
+        """Whether a body settles with friction on what touches it besides."""
+        return any(bed.drags and not bed.sticks for bed in self.beds)
+
     def at_rest(self, places: FloatArray) -> "Tool":
         """Return the tool of linear elasticity: gaps of nodes are those above their undeformed ``places``.
 

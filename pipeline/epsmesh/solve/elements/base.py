@@ -55,7 +55,7 @@ class HierarchicalEstimate:
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact,
     ``at_edge`` what the size of the elements at its edge has of it.
     ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
-    ``rest_force_bar`` that on the force of such a jaw.
+    ``rest_force_bar`` that on the force of such a jaw, ``rest_slip_bar`` (m) that on the slip along such a support.
     ``pull`` is what jaws do that are pulled, with its bars.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
@@ -70,6 +70,7 @@ class HierarchicalEstimate:
     at_edge: float = 0.0
     rest_bar: float = nan
     rest_force_bar: float = nan
+    rest_slip_bar: float = nan
     friction_bar: float = 0.0
     pull: PullResult | None = None
     is_solved: bool = False

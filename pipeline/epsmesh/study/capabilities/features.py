@@ -225,6 +225,32 @@ def _is_in_space(scene: Scene) -> bool:
     return _is_off_axis(scene) or not scene.probe.is_round or scene.mesh.model == "3d"
 
 
+def _is_curved_support(scene: Scene) -> bool:
+    return scene.body.resting is not None and not scene.body.resting.is_flat
+
+
+def _has_path_on_support(scene: Scene) -> bool:
+    """Return whether friction with a support that lets go is followed: tissue sticks to a plane from the beginning."""
+    friction = 0.0 if scene.body.resting is None else scene.body.resting.friction
+    return friction > 0 and (friction < inf or _is_curved_support(scene))
+
+
+def _is_middle(scene: Scene) -> bool:
+    """Return whether the tool presses down along the axis of the body."""
+    frame = scene.probe.frame_on(scene.body)
+    return frame.is_upright and frame.point[:2] == (0.0, 0.0)
+
+
+def _of_support(name: str) -> Callable[[Scene], tuple[str, Any] | None]:
+    """Return what tells a key of a support that lets go."""
+
+    def told(scene: Scene) -> tuple[str, Any] | None:
+        rest = scene.body.resting
+        return None if rest is None else (f"body.support.{name}", getattr(rest, name))
+
+    return told
+
+
 FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
@@ -318,10 +344,13 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: s.probe.jaw is not None and s.probe.jaw.is_flat, write=lambda _: None
     ),
     "support that lets go": Feature("body.support", lambda s: s.body.resting is not None),
-    "support on which tissue slides": Feature(
-        "body.support.friction",
-        lambda s: s.body.resting is not None and 0 < s.body.resting.friction < inf,
-        where=lambda s: ("body.support.friction", s.body.resting.friction) if s.body.resting else None,
+    "support with a path of friction": Feature(
+        "body.support.friction", _has_path_on_support, where=_of_support("friction"), write=_coefficient
+    ),
+    "hollow support": Feature("body.support.hollow", lambda s: s.body.resting is not None and s.body.resting.hollow),
+    "curved support": Feature("body.support.shape", _is_curved_support, where=_of_support("shape")),
+    "tool beside the middle of a curved support": Feature(
+        "probe.at", lambda s: _is_curved_support(s) and not _is_middle(s), PLACE, list
     ),
     "prescribed footprint on a support that lets go": Feature(
         "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)

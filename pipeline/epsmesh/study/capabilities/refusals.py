@@ -274,13 +274,22 @@ REFUSALS: tuple[Refusal, ...] = (
         "accuracy",
         "has an edge where tissue lifts off, which meshes for an accuracy do not refine: give sizes",
     ),
-    *(
-        Refusal(
-            "support on which tissue slides",
-            preloaded,
-            f'must be 0 or "stick" with {what}: how tissue slides while the body settles is not computed',
-        )
-        for preloaded, what in (("loads", "loads"), ("tension of the capsule", "a capsule that is stretched before"))
+    Refusal(
+        "support with a path of friction",
+        "tension of the capsule",
+        'must be 0, or "stick" on a plane, with a capsule that is stretched before: how tissue slides while it '
+        "contracts is not computed",
+    ),
+    Refusal(
+        "support with a path of friction",
+        "hollow support",
+        "must be 0 in a hollow support: the body begins to touch it at edges, where friction does not settle",
+    ),
+    Refusal(
+        "tool beside the middle of a curved support",
+        "curved support",
+        "is beside the middle of a curved support, on which the body would roll: press down at [0, 0] of the top, or "
+        'use shape = "plane"',
     ),
     Refusal(
         "capsule on the surface",
