@@ -191,3 +191,10 @@ def test_ranks_agree():
     )
     assert both.force == pytest.approx(alone.force, rel=1e-7)
     assert both.largest["jaw_contact_area"] == pytest.approx(alone.largest["jaw_contact_area"], rel=1e-6)
+
+
+def test_the_bar_of_a_jaw_knows_its_sharp_end_as_that_of_a_tool_does():
+    """Of two sharp discs that press nearly alike the bars are alike, too."""
+    found = closed(DISC, {"depth": "0.201 mm"})
+    bar = found.largest["jaw_force_error"] / found.largest["jaw_force"]
+    assert 0.8 * found.force_error < bar < 1.5 * found.force_error

@@ -215,6 +215,7 @@ def jaw_at(jaw: Probe, frame: Frame, pace: float) -> Bed:
         pace=pace,
         ends_at=tool.ends_at,
         foot=frame.point,
+        is_sharp=tool.is_sharp,
     )
 
 

@@ -26,7 +26,8 @@ class Bed:
 
     It is a support, or a jaw that has an edge: ``ends_at`` is a mask of points (n, 3) on the edge of its candidates,
     true where it ends itself. A jaw advances along its normal by ``pace`` times the tool's depth; ``foot`` (m) is on
-    its axis. ``is_tissue``: it is the tissue below a loose layer, whose displacements are those relative to it.
+    its axis, and ``is_sharp`` says that it ends at a sharp edge. ``is_tissue``: it is the tissue below a loose layer,
+    whose displacements are those relative to it.
     """
 
     distance: Callable[[FloatArray, float], Distance]
@@ -39,6 +40,7 @@ class Bed:
     ends_at: Callable[[FloatArray], BoolArray] | None = None
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_tissue: bool = False
+    is_sharp: bool = False
 
     @property
     def is_support(self) -> bool:

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from epsmesh import fitted
-from epsmesh.arrays import FloatArray
+from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.contact.elements import FreeResponse
 from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates
 from epsmesh.solve.contact.touching import ContactSolution
@@ -144,3 +144,21 @@ def semi_axis(points: FloatArray, load: FloatArray, mirrored: tuple[int, ...]) -
     for axis in mirrored:
         moments[axis, 1 - axis] = moments[1 - axis, axis] = 0.0
     return _SEMI_AXIS * float(np.sqrt(max(np.linalg.eigvalsh(moments)[0], 0.0)))
+
+
+def share_at_end(
+    candidates: Candidates,
+    active: BoolArray,
+    ends_at: Callable[[FloatArray], BoolArray],
+    turn: FloatArray | None = None,
+) -> float:
+    """Return the share of the facets of ``active`` nodes (n) that are where a tool ``ends_at``.
+
+    Areas are normal to the last axis after a ``turn`` (3, 3).
+    """
+    edge = np.flatnonzero(candidates.is_edge)
+    at_end = np.zeros(len(candidates), dtype=bool)
+    at_end[edge] = ends_at(candidates.points[edge])
+    seen = candidates if turn is None else replace(candidates, points=candidates.points @ turn.T)
+    areas = seen.areas * active[candidates.facets].any(axis=1)
+    return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())

@@ -10,7 +10,7 @@ import numpy as np
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.bed import Bed
-from epsmesh.solve.contact.geometry import Area, contact_area, semi_axis
+from epsmesh.solve.contact.geometry import Area, contact_area, semi_axis, share_at_end
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.touching import ContactSolution
@@ -47,10 +47,15 @@ class Rest:
     @cached_property
     def _in_its_plane(self) -> "Rest":
         """It with the axes of the bed, as those of a tool that presses along the last one."""
-        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
-        axes[-1] *= -1.0
+        axes = self._axes
         candidates = replace(self.candidates, points=self.candidates.points @ axes.T)
         return replace(self, candidates=candidates, touched=replace(self.touched, forces=self.touched.forces @ axes.T))
+
+    @property
+    def _axes(self) -> FloatArray:
+        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
+        axes[-1] *= -1.0
+        return np.asarray(axes)
 
     @cached_property
     def area(self) -> Area:
@@ -121,7 +126,15 @@ class Rest:
         """Return the relative bar on the force of a jaw, or of tissue, by contact in a ``finer`` degree."""
         if self.bed.is_support and not self.bed.is_tissue:
             return nan
-        return found_again_bar(1 - finer.pressed / self.pressed, self.area.bar, fitted.AT_EDGE_LARGE[degree])[1]
+        share, least = 1 - finer.pressed / self.pressed, fitted.AT_EDGE_LARGE[degree]
+        return found_again_bar(share, self.area.bar, least, at_end=self._at_sharp_end)[1]
+
+    @property
+    def _at_sharp_end(self) -> float:
+        """The share of the facets in contact that are at a sharp end of a jaw, off which nodes slide."""
+        if not (self.bed.is_sharp and self.bed.ends_at):
+            return 0.0
+        return share_at_end(self.candidates, self.touched.active, self.bed.ends_at, self._axes)
 
     def half_the_steps(self, found: HierarchicalEstimate, coarse: "Rest", smooth: "Rest") -> HierarchicalEstimate:
         """Return the estimate ``found`` beside this support's friction, with the bars of that.

@@ -12,7 +12,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.coulomb import rubbing_of
-from epsmesh.solve.contact.geometry import Area, contact_area
+from epsmesh.solve.contact.geometry import Area, contact_area, share_at_end
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -63,13 +63,7 @@ class SurfaceContact:
         """Return the share of the facets in contact that are at a sharp end of the tool, off which nodes slide."""
         if not self.tool.is_sharp:
             return 0.0
-        candidates, touched = self.candidates, self.touched
-        edge = np.flatnonzero(candidates.is_edge)
-        at_end = np.zeros(len(candidates), dtype=bool)
-        at_end[edge] = self.tool.ends_at(candidates.points[edge])
-        touching = touched.active[candidates.facets].any(axis=1)
-        areas = candidates.areas * touching
-        return float(areas[at_end[candidates.facets].any(axis=1)].sum() / areas.sum())
+        return share_at_end(self.candidates, self.touched.active, self.tool.ends_at)
 
     def result(self, sag: float, load_energy: float, shift: float = nan) -> ContactResult:
         """Return the whole contact; ``sag`` (m), ``load_energy`` (J) of the whole body and ``shift`` (m) are the
