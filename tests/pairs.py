@@ -264,7 +264,7 @@ def _support(study: Study) -> None:
 
 def _loose(study: Study) -> None:
     """Let a layer lie loose on the rest of the body, and find the contact of the tool with that of it."""
-    flap = {"name": "flap", "thickness": "8 mm", "young": "20 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
+    flap = {"name": "flap", "thickness": "4 mm", "young": "20 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
     study["body"].setdefault("layer", []).insert(0, flap | {"contact": "unilateral", "friction": "stick"})
     study["probe"].setdefault("contact", "unilateral")
 
