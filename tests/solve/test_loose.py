@@ -55,7 +55,7 @@ def test_a_layer_that_sticks_and_lifts_nowhere_is_bonded(poisson):
     assert stuck.largest["interface_force"] == pytest.approx(stuck.force + WEIGHT, rel=1e-7)
 
 
-@pytest.mark.parametrize("friction", [0, 0.3, "stick"])
+@pytest.mark.parametrize("friction", [0, pytest.param(0.3, marks=pytest.mark.nightly), "stick"])
 def test_on_stiff_tissue_a_layer_lies_as_on_a_rigid_support(friction):
     """The mesh of the layer is another one than that of a body of its size: bars cover the difference."""
     stiff = {"young": "1 GPa", "poisson": 0.3}

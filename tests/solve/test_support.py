@@ -106,7 +106,7 @@ def test_a_heavy_body_settles_with_friction_before_the_tool_comes(material):
     assert some.load_energy < smooth.load_energy  # friction spares the tissue a part of the work of its weight
 
 
-@pytest.mark.parametrize(("friction", "holds"), [(0.3, True), (0.1, False)])
+@pytest.mark.parametrize(("friction", "holds"), [(0.3, True), pytest.param(0.1, False, marks=pytest.mark.nightly)])
 def test_a_body_slides_down_a_table_that_is_steeper_than_friction(friction, holds):
     """Coulomb's: it slides where the tangent of the slope, here 0.123, is larger than the coefficient."""
     slope = np.radians(7)
@@ -136,6 +136,7 @@ def test_tissue_that_is_pressed_from_above_slides_by_poissons_ratio():
     assert found.largest["support_slip"] == pytest.approx(0.3 * 200 / 10e3 * np.hypot(20e-3, 20e-3), rel=3e-3)
 
 
+@pytest.mark.nightly
 def test_steps_of_the_loads_are_in_the_error_bars():
     """The path is followed in steps: with half of them, force and slip change by less than the bars."""
     changes = {"probe": BALL, "body": on(0.05), **HEAVY}
