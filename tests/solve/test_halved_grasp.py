@@ -100,7 +100,7 @@ def test_halves_are_pulled_as_the_whole(material):
     assert half.force == pytest.approx(whole.force, rel=1e-5)
     assert half.largest["jaw_pull_force"] == half.largest["pull_force"]
     for name, value in whole.largest.items():
-        assert half.largest[name] == pytest.approx(value, rel=1e-2 if name.endswith("_error") else 1e-4, abs=1e-12), (
+        assert half.largest[name] == pytest.approx(value, rel=2e-2 if name.endswith("_error") else 1e-4, abs=1e-12), (
             name
         )
     assert half.balance < 1e-6
@@ -116,7 +116,7 @@ def test_off_the_middle_halves_turn_their_jaws_against_each_other():
     assert half.largest["jaw_torque"] == -half.torque != 0.0
     for axis in "xyz":
         name = f"jaw_force_vector_{axis}"
-        assert half.largest[name] == pytest.approx(whole.largest[name], abs=1e-6 * half.force)
+        assert half.largest[name] == pytest.approx(whole.largest[name], abs=1e-5 * half.force)
 
 
 @pytest.mark.parametrize(
