@@ -21,10 +21,9 @@ from epsmesh.units import canonical
 _ENDED = "load steps end there"
 # Quantities with a bar that grow with the depth, no faster than F.
 _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
-# Forces of two jaws, among the further numbers of a record.
+# Forces of two jaws, and on a loose layer, among the further numbers of a record.
 _OF_JAWS = ("jaw_force", "closed_force", "pull_force", "jaw_pull_force", "slip_begins_force", "slip_whole_force")
-_FURTHER = ("interface_force",)
-_FORCES_OF_JAWS = (*_OF_JAWS, *_FURTHER, *(f"jaw_force_vector_{axis}" for axis in "xyz"))
+_FURTHER_FORCES = (*_OF_JAWS, "interface_force", *(f"jaw_force_vector_{axis}" for axis in "xyz"))
 _ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 
 
@@ -104,7 +103,7 @@ def at_force(plan: Plan, case: Case, record: Record | None, *, is_exact: bool = 
     force = canonical(found.times * record.force)
     off = max(found.exponent, 1.0) * found.error / found.depth
     barred = _barred(record, off)
-    by = dict.fromkeys(_FORCES_OF_JAWS, found.times)
+    by = dict.fromkeys(_FURTHER_FORCES, found.times)
     by |= dict.fromkeys(_ENERGIES_OF_PULL, found.times * found.depth / found.solved)
     largest = {name: by.get(name, 1.0) * value for name, value in barred.largest.items()}
     return replace(barred, force=force, force_vector=(x, y, z), energy=energy, largest=largest)

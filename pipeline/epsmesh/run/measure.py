@@ -139,8 +139,7 @@ def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
         return _of_jaw(case, solution.contact, bar)
     if case.body.loose is None or rest is None:
         return of_rest(solution)
-    force = sum(n * f for n, f in zip(rest.normal, rest.force, strict=True))
-    found = {"interface_force": force, "interface_force_error": rest.force_bar * abs(force)}
+    found = {"interface_force": rest.pressed, "interface_force_error": rest.force_bar * abs(rest.pressed)}
     return found | {"lift_off_area": rest.lifted, "lift_off_area_error": rest.bar * rest.area}
 
 
@@ -152,11 +151,10 @@ def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, 
     if contact is None or contact.rest is None:
         return {}
     rest = contact.rest
-    force = sum(n * f for n, f in zip(rest.normal, rest.force, strict=True))
     vector = turned_back(case.frame.turn, (0.0 - rest.force[0], 0.0 - rest.force[1], 0.0 - rest.force[2]))
     return {
-        "jaw_force": force,
-        "jaw_force_error": rest.force_bar * abs(force),
+        "jaw_force": rest.pressed,
+        "jaw_force_error": rest.force_bar * abs(rest.pressed),
         "jaw_contact_area": rest.area,
         "jaw_contact_area_error": rest.bar * rest.area,
         "jaw_torque": rest.torque,

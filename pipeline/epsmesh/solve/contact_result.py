@@ -103,6 +103,11 @@ class RestResult:
     slip: float = nan
     slip_bar: float = nan
 
+    @property
+    def pressed(self) -> float:
+        """The force (N) along the normal."""
+        return sum(n * f for n, f in zip(self.normal, self.force, strict=True))
+
     def with_least_bar(self, share: float) -> "RestResult":
         """Return it with relative bars on force and area of a jaw of at least ``share``."""
         if isnan(self.force_bar):
