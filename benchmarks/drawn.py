@@ -187,16 +187,22 @@ def truths(study: Study, bar: float) -> Iterator[Study]:
 def _sizes_of_truths(study: Study) -> _Sizes:
     if not has_two_contacts(study):
         return _SIZES
-    of_support = study["body"].get("support", {}).get("friction", 0)
-    if tools(study)[0].get("friction", 0) or of_support not in (0, "stick"):
+    below = _loose(study), study["body"].get("support", {}).get("friction")
+    if tools(study)[0].get("friction", 0) or not {*below} <= {None, 0, "stick"}:
         return _RUBBING
     is_round = all(tool.get("shape", "sphere") in _ROUND for tool in tools(study))
     return (*_OF_ROUND, *_OF_TWO) if is_round and study["mesh"].get("degree", 2) == 2 else _OF_TWO
 
 
 def has_two_contacts(study: Study) -> bool:
-    """Return whether the body touches more than one tool: a second jaw, or a support that lets go."""
-    return len(tools(study)) > 1 or "support" in study["body"]
+    """Return whether the body touches more than one tool: a second jaw, or what lets go below it or in it."""
+    return len(tools(study)) > 1 or "support" in study["body"] or _loose(study) is not None
+
+
+def _loose(study: Study) -> Any:
+    """Return the friction of the loose layer of a study; None if it has none."""
+    layers = study["body"].get("layer", [])
+    return next((layer.get("friction", 0) for layer in layers if layer.get("contact") == "unilateral"), None)
 
 
 @contextmanager

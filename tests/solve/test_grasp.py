@@ -198,3 +198,15 @@ def test_the_bar_of_a_jaw_knows_its_sharp_end_as_that_of_a_tool_does():
     found = closed(DISC, {"depth": "0.201 mm"})
     bar = found.largest["jaw_force_error"] / found.largest["jaw_force"]
     assert 0.8 * found.force_error < bar < 1.5 * found.force_error
+
+
+def test_a_rounded_jaw_opposite_a_sharp_one_on_a_free_body_has_its_bar():
+    """The body hands on the error of the sharp one: if nothing else holds it, both forces are one."""
+    found = closed(DISC, {"edge": "1 mm"}, body={"fixed": "none"})
+    assert found.largest["jaw_force"] == pytest.approx(found.force, rel=1e-8)
+    bar = found.largest["jaw_force_error"] / found.largest["jaw_force"]
+    assert bar == pytest.approx(found.force_error, rel=0.02)
+    other = closed(DISC | {"edge": "1 mm"}, {"edge": "0 mm"}, body={"fixed": "none"})
+    assert other.force_error > 0.8 * found.force_error
+    round_only = closed(DISC | {"edge": "1 mm"}, {}, body={"fixed": "none"})
+    assert round_only.force_error < 0.5 * found.force_error

@@ -309,8 +309,9 @@ class LargeContactSolution:
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])
-        least = fitted.AT_EDGE_LARGE[self.body.elements.degree]
-        decrement, bar = found_again_bar(share, at_edge, least, at_end=here.at_sharp_end)
+        at_end = max([here.at_sharp_end, *(rest.at_sharp_end for rest in self.rests)])
+        degree = self.body.elements.degree
+        decrement, bar = found_again_bar(share, at_edge, fitted.AT_EDGE_LARGE[degree], at_end=at_end)
         bar = max([bar, *(rest.unresolved for rest in self.rests)])
         if any(rest.unresolved > fitted.MOST_UNRESOLVED for rest in self.rests):
             raise LargeError("the contact with the support is smaller than elements there: use a smaller `fine`")
@@ -324,7 +325,7 @@ class LargeContactSolution:
         return replace(
             found,
             rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1),
-            rest_force_bar=rest.force_bar(again, self.body.elements.degree),
+            rest_force_bar=rest.force_bar(again, degree, at_edge, at_end),
             rest_slip_bar=bar * rest.slip + abs(again.slip - rest.slip),
         )
 

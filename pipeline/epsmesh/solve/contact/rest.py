@@ -122,15 +122,19 @@ class Rest:
         """The force (N) on the modelled part along the normal."""
         return float(self.force @ np.array(self.bed.normal))
 
-    def force_bar(self, finer: "Rest", degree: int) -> float:
-        """Return the relative bar on the force of a jaw, or of tissue, by contact in a ``finer`` degree."""
+    def force_bar(self, finer: "Rest", degree: int, at_edge: float, at_end: float) -> float:
+        """Return the relative bar on the force of a jaw, or of tissue, by contact in a ``finer`` degree.
+
+        What is unknown at the edges and sharp ends of all contacts, as in `found_again_bar`, bounds each force: the
+        body hands it on.
+        """
         if self.bed.is_support and not self.bed.is_tissue:
             return nan
         share, least = 1 - finer.pressed / self.pressed, fitted.AT_EDGE_LARGE[degree]
-        return found_again_bar(share, self.area.bar, least, at_end=self._at_sharp_end)[1]
+        return found_again_bar(share, at_edge, least, at_end=at_end)[1]
 
     @property
-    def _at_sharp_end(self) -> float:
+    def at_sharp_end(self) -> float:
         """The share of the facets in contact that are at a sharp end of a jaw, off which nodes slide."""
         if not (self.bed.is_sharp and self.bed.ends_at):
             return 0.0
