@@ -25,7 +25,8 @@ from benchmarks.families import Dice, mm
 from benchmarks.tables import options
 from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.run.meshing import mesh_case
-from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.run.problem import law_of, movement_of
+from epsmesh.run.tools import tool_of
 from epsmesh.solve import SolveError
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.contact.large import LargeContact

@@ -94,7 +94,7 @@ def _meshed(tool: str, size: str) -> tuple[Any, Any]:
 
 def _solved(case: Any, body: Any, element: str, law: str, depths: list[float], *, estimate: bool) -> int:
     """Solve for ``depths`` (m) on one load path, all set-up included; return the number of unknowns."""
-    from epsmesh.run.problem import tool_of
+    from epsmesh.run.tools import tool_of
     from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
     from epsmesh.solve.movement import Movement
     from epsmesh.solve.physics import MaterialLaw

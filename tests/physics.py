@@ -24,7 +24,7 @@ SOURCES = (
         f"run/{name}.py"
         for name in ("attempts", "basis", "far_field", "fields", "loads", "measure", "meshing", "outputs")
     ),
-    *(f"run/{name}.py" for name in ("problem", "record", "runner", "samples", "solved")),
+    *(f"run/{name}.py" for name in ("problem", "record", "runner", "samples", "solved", "tools")),
 )
 COMMAND = "python -m tests.physics"
 # Fields of syntax trees without effect, or that some versions of Python have.

@@ -8,7 +8,8 @@ import pytest
 from mpi4py import MPI
 
 from epsmesh.run.meshing import mesh_case
-from epsmesh.run.problem import law_of, tool_of
+from epsmesh.run.problem import law_of
+from epsmesh.run.tools import tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
 from epsmesh.solve.contact.contact_steps import (
     ContactPath,

@@ -13,7 +13,8 @@ from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.loads import loads_of
 from epsmesh.run.meshing import mesh_case
-from epsmesh.run.problem import law_of, movement_of, tool_of
+from epsmesh.run.problem import law_of, movement_of
+from epsmesh.run.tools import tool_of
 from epsmesh.scene.model import FIXED, FREE, PROBE
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import general_form

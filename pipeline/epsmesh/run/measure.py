@@ -11,8 +11,8 @@ from epsmesh.plan.cost import features
 from epsmesh.plan.recipe import edge_width_of, half_width_of, has_sure_contact, has_sure_limit, is_ball, is_thin
 from epsmesh.plan.refinement import is_refined
 from epsmesh.plan.steps import Solve
-from epsmesh.run.problem import normal_of
 from epsmesh.run.record import Record
+from epsmesh.run.tools import normal_of
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh, exterior_facets
-from epsmesh.run.problem import tool_at
+from epsmesh.run.tools import tool_at
 from epsmesh.scene.model import FIXED, FREE, MIRROR, PROBE
 from epsmesh.shapes.contact import UPRIGHT
 from epsmesh.shapes.frame import Frame, Vector, angle_between

@@ -17,8 +17,8 @@ from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.run.fields import moduli_of
 from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
-from epsmesh.run.problem import beds_on
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
+from epsmesh.run.tools import beds_on
 from epsmesh.scene.model import BELOW, PROBE
 from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.section import in_mm
