@@ -23,7 +23,6 @@ from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
-from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.checks import check_energy, check_support, force_of
 from epsmesh.solve.contact.contact_steps import (
     ContactPath,
@@ -39,8 +38,8 @@ from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import check_edges, placed_tool
 from epsmesh.solve.contact.pull import STEPS as PULL_STEPS
-from epsmesh.solve.contact.pull import Pull, force_across, pull_jaws, with_bars
-from epsmesh.solve.contact.rest import Rest, rests_of
+from epsmesh.solve.contact.pull import Pull, pull_jaws, with_bars
+from epsmesh.solve.contact.rest import Rest, force_left, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.settle import without_friction
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
@@ -268,14 +267,7 @@ class LargeContactSolution:
 
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
-        space = self.body.elements.displacements
-        local = self.body.residual().reshape(-1, 3)[space.bearing_owned, 2].sum()
-        support = float(global_sum(space.comm, np.array([local]))[0])
-        support += sum(float(rest.force[2]) for rest in self.rests if not rest.bed.is_tissue)
-        support -= float(self.body.on_terms[2])
-        balance = abs(support / self.force - 1)
-        if self.beside is not None and self.beside.pulls:
-            balance = max(balance, force_across(self.body, self.touched) / self.force)
+        balance = float(np.linalg.norm(force_left(self.body, self.tool.beds, self.touched))) / self.force
         check_balance(balance)
         on_probe = self.surface_contact.touched.forces.sum(axis=0)[None] / self.depth
         return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)

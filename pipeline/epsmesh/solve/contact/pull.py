@@ -14,7 +14,6 @@ from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.mesh.distribute import BodyMesh
 from epsmesh.solve import SolveError
-from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.contact_steps import (
     ContactPath,
@@ -204,18 +203,6 @@ def with_bars(
     found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
     # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
     return replace(found, begins=found.begins and found.begins.from_zero())
-
-
-def force_across(body: DeformedBody, touched: ContactSolution) -> float:
-    """Return the force (N) across the axis that is left on the modelled part, of support, terms and contacts.
-
-    Collective. Planes of symmetry may bear forces across them.
-    """
-    space = body.elements.displacements
-    local = body.residual().reshape(-1, 3)[space.fixed_owned].sum(axis=0)
-    left = global_sum(space.comm, local) - body.on_terms + touched.forces.sum(axis=0)
-    left[list(body.elements.body.mirrored)] = 0.0
-    return float(np.linalg.norm(left[:2]))
 
 
 def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolution, along: FloatArray) -> PullStep:

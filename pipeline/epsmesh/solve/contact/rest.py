@@ -1,4 +1,4 @@
-"""What a bed does to a body that rests on it, or that it holds as a jaw: reaction, and area in contact."""
+"""What a bed does to a body that rests on it, or that it holds as a jaw: reaction, area in contact, and balance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ import numpy as np
 
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
+from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.bed import Bed
 from epsmesh.solve.contact.geometry import Area, contact_area, semi_axis, share_at_end
 from epsmesh.solve.contact.surface import Candidates
@@ -162,3 +163,19 @@ def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) 
         modulus, moved = candidates.from_regions(body.law.plane_moduli), part.of(body.positions() - body.places)
         found.append(Rest(bed, candidates, part.solution(touched), modulus, moved, body.elements.body.mirrored))
     return tuple(found)
+
+
+def force_left(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> FloatArray:
+    """Return the sum (3), N, of all forces from outside on the modelled part: zero at equilibrium. Collective.
+
+    They are those of what holds it, of terms, and of what has ``touched`` it: the tool and the ``beds``, but for the
+    tissue below a loose layer, which is of the body itself. Across planes of symmetry, which bear forces, it is zero.
+    """
+    space, forces = body.elements.displacements, touched.forces.copy()
+    for number, bed in enumerate(beds, start=1):
+        if bed.is_tissue:
+            forces[body.part(number).nodes] = 0.0
+    held = global_sum(space.comm, body.residual().reshape(-1, 3)[space.bearing_owned].sum(axis=0))
+    left = held - body.on_terms + forces.sum(axis=0)
+    left[list(body.elements.body.mirrored)] = 0.0
+    return np.asarray(left)

@@ -10,17 +10,16 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.balance import check_balance
-from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.contact_steps import ContactPath, ContactPathPoint, Friction, friction_step
 from epsmesh.solve.contact.deformed import solve_contact
 from epsmesh.solve.contact.placed import placed_tool
+from epsmesh.solve.contact.rest import force_left
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.hold import check_hold
 from epsmesh.solve.newton import EASY, LargeError
 from epsmesh.solve.path import follow
-from epsmesh.solve.response import whole_force
 from epsmesh.solve.spaces import ElasticSpace
 from epsmesh.stages import stage
 
@@ -90,13 +89,7 @@ def settle(
     body.state = path.last.state
     if limit:
         return touched
-    space, forces = body.elements.displacements, touched.forces.copy()
-    for number, bed in enumerate(tool.beds, start=1):
-        if bed.is_tissue:  # of the body itself
-            forces[body.part(number).nodes] = 0.0
-    fixed = global_sum(space.comm, body.residual().reshape(-1, 3)[space.fixed_owned].sum(axis=0))
-    left = whole_force(forces.sum(axis=0) + fixed - body.on_terms, body.elements.body.mirrored)
-    check_balance(float(np.linalg.norm(left)) / (2.0 ** len(body.elements.body.mirrored) * body.size_on_terms))
+    check_balance(float(np.linalg.norm(force_left(body, tool.beds, touched))) / body.size_on_terms)
     return touched
 
 
