@@ -15,6 +15,7 @@ from epsmesh.view.numbers import FACES, mesh_arrays
 from epsmesh.view.page import render
 from epsmesh.view.tool import tool_of
 from tests.cases import raw
+from tests.solve.test_curved_support import SHAPES, on_a
 from tests.solve.test_grasp import BALL, grasp
 from tests.solve.test_loose import WEIGHT, flap
 from tests.solve.test_support import HEAVY, on
@@ -120,6 +121,21 @@ def test_the_plane_of_a_support_reaches_beyond_the_body_and_does_not_move(rests)
     assert (plane[:, :2].max(axis=0) > 22e-3).all()
     inputs = told(rests)[1]
     assert (inputs["touching"], inputs["held"]) == ("tool and support", "on the support")
+
+
+@pytest.mark.parametrize(("shape", "hollow"), SHAPES)
+@pytest.mark.parametrize("radius", ["12 mm", "100 mm"])
+def test_a_round_support_is_drawn_below_the_body_as_far_as_it_goes(shape, hollow, radius):
+    if hollow and radius == "12 mm":
+        pytest.skip("the body is larger")
+    found = fields(raw(body=on_a(shape, radius, hollow=hollow), probe=BALL), mesh_only=True)
+    tool, ground = tool_of(found), found.case.body.ground
+    own = tool.points[tool.moved[:, 2] == 0]
+    assert ground.distance(own).gap == pytest.approx(0.0, abs=1e-5)
+    body = found.points[found.facets[FIXED]].reshape(-1, 3)
+    assert ground.distance(body).gap.min() == pytest.approx(0.0, abs=1e-9)
+    across = np.hypot(*own[:, :2].T).max() if shape == "sphere" else own[:, 1].max()
+    assert across == pytest.approx(min(ground.radius, 22e-3 if shape == "cylinder" else 30e-3), rel=0.2)
 
 
 def test_what_nothing_but_jaws_holds_has_no_fixed_part():

@@ -7,6 +7,7 @@ import numpy as np
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.scene.model import JAW, PROBE
 from epsmesh.shapes.contact import first_touch
+from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
 from epsmesh.view.fields import Fields
@@ -19,8 +20,9 @@ _LINES, _POINTS = 49, 60
 _ROUND, _ACROSS = 4.0, 1.5
 # Bisections of a line for the point at a height.
 _HALVINGS = 40
-# How far the plane of a support is drawn beyond the body, and below it, in extents of the body.
-_BEYOND, _BELOW = 0.08, 1e-4
+# How far a support is drawn beyond the body, and below it, in extents of the body; the share of the radius of a round
+# one that is left out, where its surface becomes vertical.
+_BEYOND, _BELOW, _BEFORE_VERTICAL = 0.08, 1e-4, 1e-6
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,13 @@ class Tool:
 
 
 def tool_of(fields: Fields) -> Tool:
-    """Return the tool of a case, the second jaw of a grasp, and the plane of a support that lets go."""
+    """Return the tool of a case, the second jaw of a grasp, and a support that lets go."""
     case = fields.case
     parts = [_tool(fields, case.probe, PROBE)]
     if case.jaw is not None:
         parts.append(_tool(fields, case.jaw, JAW))
-    if (rest := case.body.resting) is not None and rest.is_flat:
-        parts.append(_plane_below(fields))
+    if case.body.resting is not None and (ground := case.body.ground) is not None:
+        parts.append(_below(fields, ground))
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     return Tool(
         points=np.vstack([part.points for part in parts]),
@@ -48,14 +50,30 @@ def tool_of(fields: Fields) -> Tool:
     )
 
 
-def _plane_below(fields: Fields) -> Tool:
-    """Return the rigid plane on which the body rests, a bit below it: a part that reaches beyond the body."""
+def _below(fields: Fields, ground: Ground) -> Tool:
+    """Return the rigid ``ground`` on which the body rests, a bit below it: a part that reaches beyond the body."""
     low, high = fields.points.min(axis=0), fields.points.max(axis=0)
     extent = float(np.linalg.norm(high - low))
-    x, y = (np.array([low[axis], high[axis]]) + _BEYOND * extent * np.array([-1, 1]) for axis in (0, 1))
-    height, _ = fields.case.body.heights
-    points = np.array([(x[i], y[j], height - _BELOW * extent) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])
-    return Tool(points, np.array([[0, 1, 2], [0, 2, 3]]), np.zeros_like(points))
+    ends = np.array([low[:2], high[:2]]) + _BEYOND * extent * np.array([[-1.0], [1.0]]) - ground.point[:2]
+    most = (1 - _BEFORE_VERTICAL) * ground.radius
+    if len(ground.across) == 2:  # a ball: circles about its top
+        reach = min(float(np.linalg.norm(np.abs(ends).max(axis=0))), most)
+        radii = most * np.sin(np.linspace(0.0, np.arcsin(reach / most), _POINTS))
+        angles = np.linspace(0, 2 * np.pi, _LINES)
+        aside = radii * np.array([np.cos(angles), np.sin(angles)])[:, :, None]
+    else:
+        x, y = ends.T
+        for across in ground.across:
+            curved = int(np.abs(across).argmax())
+            angles = np.arcsin(np.clip(ends[:, curved] / most, -1.0, 1.0))
+            on_arc = most * np.sin(np.linspace(*angles, _POINTS))
+            x, y = (on_arc, y) if curved == 0 else (x, on_arc)
+        aside = np.array(np.meshgrid(x, y, indexing="ij"))
+    lines, points = aside.shape[1:]
+    level = ground.point + np.column_stack([*aside.reshape(2, -1), np.zeros(lines * points)])
+    down = ground.height(level) + _BELOW * extent
+    places = level - down[:, None] * np.array(ground.normal)
+    return Tool(places, _between_lines(lines, points), np.zeros_like(places))
 
 
 def _tool(fields: Fields, probe: Probe, group: str) -> Tool:
