@@ -33,7 +33,7 @@ from tests.same.outcome import Outcome
 # Functions whose arguments are read, by the modules that call them.
 _CALLED = {
     "found_bar": ("epsmesh.solve.contact.found",),
-    "found_again_bar": ("epsmesh.solve.contact.found", "epsmesh.solve.contact.large"),
+    "found_again_bar": ("epsmesh.solve.contact.found", "epsmesh.solve.contact.large_solution"),
     "record_of": ("epsmesh.run.runner", "epsmesh.run.solved"),
 }
 # Samples from which a verdict is given, and from which a range leaves out 5 % of them.

@@ -93,6 +93,14 @@ def test_a_finer_mesh_is_within_the_error_bars():
     assert abs(coarse.largest["lift_off_area"] - fine.largest["lift_off_area"]) < sum(bars)
 
 
+def test_a_support_that_nodes_are_too_far_apart_to_press_on_is_named():
+    """Corners of elements of degree 2 press only with their neighbours, which are above a hollow ball."""
+    found = one(probe=BALL, body=on_a("sphere", "90 mm", hollow=True))
+    assert found.status == "failed"
+    assert "next to the support that may press on it are 0.55 mm above it" in found.message
+    assert "probe" not in found.message
+
+
 @pytest.mark.parametrize(
     ("support", "probe", "said"),
     [

@@ -8,9 +8,9 @@ from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of
 from epsmesh.run.tools import tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
-from epsmesh.solve.contact import contact_steps, large
+from epsmesh.solve.contact import contact_steps, large_solution
 from epsmesh.solve.contact.deformed import solve_contact
-from epsmesh.solve.contact.large import LargeContactSolution
+from epsmesh.solve.contact.large_solution import LargeContactSolution
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.quasi_static import QuasiStaticProblem
@@ -118,7 +118,7 @@ def test_the_bar_has_a_load_path_of_its_own_where_the_next_degree_does_not_settl
 
     scene = {"material": TISSUE, "probe": SPHERE, "mesh": COARSE}
     (expected,) = solve(**scene).values()
-    monkeypatch.setattr(large, "solve_contact", fails)
+    monkeypatch.setattr(large_solution, "solve_contact", fails)
     (record,) = solve(**scene).values()
     assert record.status == "ok"
     assert record.force_error == pytest.approx(expected.force_error, rel=0.05)

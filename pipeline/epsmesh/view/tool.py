@@ -65,8 +65,8 @@ def _below(fields: Fields, ground: Ground) -> Tool:
         x, y = ends.T
         for across in ground.across:
             curved = int(np.abs(across).argmax())
-            angles = np.arcsin(np.clip(ends[:, curved] / most, -1.0, 1.0))
-            on_arc = most * np.sin(np.linspace(*angles, _POINTS))
+            first, last = np.arcsin(np.clip(ends[:, curved] / most, -1.0, 1.0))
+            on_arc = most * np.sin(np.linspace(first, last, _POINTS))
             x, y = (on_arc, y) if curved == 0 else (x, on_arc)
         aside = np.array(np.meshgrid(x, y, indexing="ij"))
     lines, points = aside.shape[1:]

@@ -179,3 +179,16 @@ def force_left(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution
     left = held - body.on_terms + forces.sum(axis=0)
     left[list(body.elements.body.mirrored)] = 0.0
     return np.asarray(left)
+
+
+def height_beside(body: DeformedBody, beds: Sequence[Bed]) -> float:
+    """Return how high (m) above a support the lowest nodes are, at rest, that may press on it alone; 0 without one.
+
+    Corners of elements of degree 2 press only if their neighbours do, too.
+    """
+    found = [0.0]
+    for number, bed in enumerate(beds, start=1):
+        if bed.is_support:
+            candidates = body.part(number).candidates
+            found.append(float(bed.height(candidates.points)[~candidates.neighbours.followers].min()))
+    return max(found)
