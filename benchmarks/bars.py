@@ -40,7 +40,7 @@ SEEDS = tomllib.loads((Path(__file__).parent / "seeds.toml").read_text(encoding=
 HELD, ALL_HELD, ENOUGH = 0.95, 0.97, 40
 _KNOWN = 1 / 3  # the truth's own bar may be this share of the scene's at most
 _LONG = 60.0  # seconds that the truth may take, as planned
-_LIMIT = 60  # seconds of the processor after which a scene is given up
+_LIMIT = 120  # seconds of the processor after which a scene is given up
 _COLUMNS = {"class": "", "scenes": "d", "held": "d", "share": ".1%", "95 %": "", "bar / error": ".2f", "worst": ".2f"}
 
 Values = dict[str, float]

@@ -66,7 +66,7 @@ def scene(seed: int, folder: Path, only: Collection[str] = ()) -> tuple[Study, d
     """
     dice = random.Random(f"bars {seed}")
     chosen: dict[str, Any] = {"only": only, "longest": _CHOSEN_SHORT} if only else {}
-    drawn, names = draw(seed, folder, fine=dice.random() < 0.25, **chosen)
+    drawn, names = draw(seed, folder, fine=dice.random() < 0.25 and not only, **chosen)
     slots = {feature.slot: feature.name for feature in FEATURES if feature.name in names}
     study = _other_proportions(drawn, dice, folder)
     if only:
