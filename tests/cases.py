@@ -24,6 +24,8 @@ BASE: dict[str, Any] = {
     "plan": {"without": ["axisymmetric"]},
 }
 
+# A mesh for what holds on any: limits, balances, symmetries, equalities of two ways.
+ROUGH: dict[str, Any] = {"fine": "10 mm", "coarse": "10 mm", "rim": "2 mm", "growth": 1.0}
 # In a mesh of an accuracy, no sizes are given.
 NO_SIZES = dict.fromkeys(("epsilon", "fine", "coarse", "rim", "growth", "degree"))
 _SOLVED: dict[tuple[int, str], Record] = {}

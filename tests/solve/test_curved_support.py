@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cases import raw, refusal
+from tests.cases import ROUGH, raw, refusal
 from tests.solve.test_support import BALL, GRAVITY, HEAVY, LARGE, WEIGHT, on, one
 
 MATERIALS = pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
@@ -26,7 +26,7 @@ def on_a(shape: str, radius: str, friction: float | str = 0, **more: Any) -> dic
 @MATERIALS
 @pytest.mark.parametrize(("shape", "hollow"), SHAPES)
 def test_a_support_of_large_radius_is_a_plane(shape, hollow, material):
-    changes = {"probe": BALL, "material": material | HEAVY["material"], "load": GRAVITY}
+    changes = {"probe": BALL, "material": material | HEAVY["material"], "load": GRAVITY, "mesh": ROUGH}
     flat, wide = (one(body=body, **changes) for body in (on(), on_a(shape, "1 km", hollow=hollow)))
     assert wide.status == "ok", wide.message
     assert wide.force == pytest.approx(flat.force, rel=1e-5)
@@ -50,7 +50,7 @@ def test_a_ball_that_is_a_support_is_one_that_is_a_jaw(material):
 @pytest.mark.parametrize(("shape", "hollow", "friction"), [(*kind, 0) for kind in SHAPES] + [("sphere", False, 0.2)])
 def test_forces_of_tool_support_and_weight_balance(shape, hollow, friction, material):
     body = on_a(shape, RADII[shape], friction, hollow=hollow)
-    found = one(probe=BALL, body=body, material=material | HEAVY["material"], load=GRAVITY)
+    found = one(probe=BALL, body=body, material=material | HEAVY["material"], load=GRAVITY, mesh=ROUGH)
     assert found.status == "ok", found.message
     assert found.balance < 1e-6
     assert found.largest["support_force"] == pytest.approx(found.force + WEIGHT, rel=1e-5)
@@ -74,7 +74,7 @@ def test_the_smaller_the_ball_below_the_softer_the_body():
 
 @MATERIALS
 def test_friction_of_a_round_support_is_between_none_and_sticking(material):
-    changes = {"probe": BALL, "material": material | HEAVY["material"], "load": GRAVITY}
+    changes = {"probe": BALL, "material": material | HEAVY["material"], "load": GRAVITY, "mesh": ROUGH}
     smooth, least, some, stuck = (
         one(body=on_a("sphere", "60 mm", friction), **changes) for friction in (0, 1e-3, 0.1, "stick")
     )

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from tests import organs
-from tests.cases import raw, refusal, solve
+from tests.cases import ROUGH, raw, refusal, solve
 from tests.verification import known
 
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.5 mm", "contact": "unilateral"}
@@ -69,29 +69,30 @@ def test_a_capsule_within_the_body_holds_it_no_more_than_the_support_does(tensio
     capsule = {"young": "0.2 MPa", "thickness": "0.1 mm", "poisson": 0.4, "tension_only": tension_only}
     cyst = {"name": "cyst", "at": ["6 mm", "3 mm", "-8 mm"], "radius": "3 mm", "young": "20 kPa"}
     cyst |= {"poisson": 0.4, "capsule": capsule}
-    fixed, rests = (one(probe=BALL, body=body | {"inclusion": [cyst]}) for body in ({}, on("stick")))
+    fixed, rests = (one(probe=BALL, body=body | {"inclusion": [cyst]}, mesh=ROUGH) for body in ({}, on("stick")))
     assert rests.force == pytest.approx(fixed.force, rel=1e-6)
-    assert "floats" in one(probe=BALL, body=on() | {"inclusion": [cyst]}).message
+    assert "floats" in one(probe=BALL, body=on() | {"inclusion": [cyst]}, mesh=ROUGH).message
 
 
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_support_is_between_none_and_sticking(material):
     smooth, least, some, more, most, stuck = (
-        one(probe=BALL, body=on(friction), material=material) for friction in (0, 1e-3, 0.1, 0.3, 2.0, "stick")
+        one(probe=BALL, body=on(friction), material=material, mesh=ROUGH)
+        for friction in (0, 1e-3, 0.1, 0.3, 2.0, "stick")
     )
     assert smooth.force < least.force < some.force < more.force < most.force
     assert least.force == pytest.approx(smooth.force, rel=1e-4)
     assert most.force == pytest.approx(stuck.force, rel=1e-7)
     assert more.balance < 1e-8
     lifted = [each.largest["lift_off_area"] for each in (smooth, least, some, more)]
-    assert lifted == sorted(lifted, reverse=True)
+    assert np.diff(lifted).max() < 1e-9 * 40e-3**2
 
 
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_a_heavy_body_settles_with_friction_before_the_tool_comes(material):
     material = material | {"density": f"{DENSITY} kg/m^3"}
     smooth, least, some, most, stuck = (
-        one(probe=BALL, body=on(friction), material=material, load=GRAVITY)
+        one(probe=BALL, body=on(friction), material=material, load=GRAVITY, mesh=ROUGH)
         for friction in (0, 1e-3, 0.05, 2.0, "stick")
     )
     assert smooth.force < some.force < stuck.force
@@ -111,7 +112,7 @@ def test_a_body_slides_down_a_table_that_is_steeper_than_friction(friction, hold
     """Coulomb's: it slides where the tangent of the slope, here 0.123, is larger than the coefficient."""
     slope = np.radians(7)
     gravity = [f"{9.81 * np.sin(slope):.9g} m/s^2", "0 m/s^2", f"{-9.81 * np.cos(slope):.9g} m/s^2"]
-    found = one(probe=BALL, body=on(friction), material=HEAVY["material"], load={"gravity": gravity})
+    found = one(probe=BALL, body=on(friction), material=HEAVY["material"], load={"gravity": gravity}, mesh=ROUGH)
     assert (found.status == "ok") == holds, found.message
     if holds:
         assert found.largest["support_force"] == pytest.approx(found.force + WEIGHT * np.cos(slope), rel=1e-6)
@@ -121,7 +122,7 @@ def test_a_body_slides_down_a_table_that_is_steeper_than_friction(friction, hold
 
 def test_friction_holds_a_heavy_body_that_is_pressed_beside_its_middle():
     probe = BALL | {"at": ["6 mm", "0 mm"]}
-    some, stuck = (one(probe=probe, body=on(friction), **HEAVY) for friction in (0.3, "stick"))
+    some, stuck = (one(probe=probe, body=on(friction), mesh=ROUGH, **HEAVY) for friction in (0.3, "stick"))
     assert some.status == "ok", some.message
     assert 0.9 * stuck.force < some.force <= (1 + 1e-6) * stuck.force
     assert some.largest["support_slip"] > stuck.largest["support_slip"] == 0.0
