@@ -53,6 +53,21 @@ def test_a_mistake_does_not_fit(validator, section, key, value):
 
 
 @pytest.mark.parametrize(
+    ("jaw", "fits"),
+    [
+        ({"together": "grasp"}, True),
+        ({"together": "grasp", "depth": "0.2 mm"}, True),
+        ({"depth": "0.2 mm"}, False),
+        ({"together": "grasp", "colour": "red"}, False),
+    ],
+)
+def test_a_second_jaw_has_what_it_leaves_out_from_the_first(validator, jaw, fits):
+    study = tomllib.loads(Path("studies/pull.toml").read_text(encoding="utf-8"))
+    study["probe"] = [study["probe"][0], jaw]
+    assert validator.is_valid(study) == fits
+
+
+@pytest.mark.parametrize(
     ("value", "fits"),
     [
         ({"from": "1 mm", "to": "3 mm", "steps": 3}, True),

@@ -48,6 +48,7 @@ _QUANTITIES = {
 _NAMES = {name for name, _ in _QUANTITIES.values()}
 # A range of values: see ranges.py. Its keys are no properties, or editors would complete them alone.
 _RANGE: Schema = {"propertyNames": {"enum": [*KEYS]}, "required": [*KEYS]}
+_SHAPED: Schema = {"required": ["shape"]}
 # Arrays of tables, and tables, within sections.
 _INNER = {*chain.from_iterable(NESTED.values()), *chain.from_iterable(TABLES.values())} - {*PLAIN_TOO}
 _PLAIN = {"boolean": "true | false", "integer": "whole number", "string": "text"}
@@ -132,14 +133,16 @@ def _section(name: str, models: tuple[type[Section], ...], definitions: Schema, 
             "description": properties["shape"]["description"],
             "enum": [shape for model in models for shape in get_args(model.model_fields["shape"].annotation)],
         }
-        rules = [
-            {
-                "if": {"properties": {"shape": {"const": get_args(model.model_fields["shape"].annotation)[0]}}},
-                "then": {"$ref": f"#/$defs/{model.__name__}"},
-            }
-            for model in models
-        ]
-        table = {"allOf": [{"required": ["shape"], "properties": properties}, *rules]}
+        rules: list[Schema] = []
+        for model in models:
+            shape = {"const": get_args(model.model_fields["shape"].annotation)[0]}
+            is_it = {"properties": {"shape": shape}, **_SHAPED}
+            rules.append({"if": is_it, "then": {"$ref": f"#/$defs/{model.__name__}"}})
+        needs: Schema = _SHAPED
+        if "together" in properties:  # a second jaw has what it leaves out from the first
+            known_keys = {"propertyNames": {"enum": [*properties]}}
+            needs = {"if": {"required": ["together"]}, "then": known_keys, "else": _SHAPED}
+        table = {"allOf": [{"properties": properties, **needs}, *rules]}
         definitions[name.capitalize()] = table
         table = {"$ref": f"#/$defs/{name.capitalize()}"}
     for model in models:  # of what is no table, a section says it
