@@ -16,12 +16,13 @@ from epsmesh.plan.equivalent_places import EquivalentPlace
 from epsmesh.plan.given_force import DepthAtForce
 from epsmesh.plan.key import digest
 from epsmesh.plan.plan import Plan
-from epsmesh.quantities import LARGEST, MESH_DIMENSIONS, RUN, attributes, quantity_of
+from epsmesh.quantities import LARGEST, RUN, attributes, quantity_of
 from epsmesh.report.along_path import along_path
 from epsmesh.report.history import over_time
 from epsmesh.report.influence import add_influence
+from epsmesh.report.ratios import add_ratios, shared
 from epsmesh.report.uncertainty import uncertainties
-from epsmesh.report.values import at_full_order, with_flags
+from epsmesh.report.values import with_flags
 from epsmesh.run.given_force import at_force, with_depths
 from epsmesh.run.outcome import without_contact
 from epsmesh.run.record import RELATIVE, Record
@@ -154,7 +155,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
     if any(case.is_closed for case in cases if not case.no_contact):
         dataset["force_error"].attrs["comment"] = _OF_CLOSURE
     # At a given force each mesh has its own depth.
-    alike = {} if study.gives_force else _shared(study, reference_keys)
+    alike = {} if study.gives_force else shared(study, reference_keys)
     for name in (name for name in of_scene if name in dataset):
         dataset[name] = dataset[name].isel(alike, drop=True)
     path = {axis.name for axis in study.axes if axis.off}
@@ -162,17 +163,7 @@ def build(plan: Plan, records: Mapping[str, Record], run: Mapping[str, Any] | No
         dataset[name] = _along(dataset[name], {*path, "component", "time"})
     for name, bar in uncertainties(plan, dataset["force"], lambda end: build(end, records)["force"]).items():
         dataset[name] = bar
-    return _linked(_add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
-
-
-def _shared(study: Study, keys: Sequence[str], at: Mapping[str, int] | None = None) -> dict[str, int]:
-    """Return dimensions of meshes along which ``keys``, one a case, are the same, each with its first place.
-
-    ``at`` has the place along a dimension that is not asked about.
-    """
-    dims = [axis.name for axis in study.axes]
-    table = xr.DataArray(np.array(keys, dtype=object).reshape(study.shape), dims=dims).isel(at or {})
-    return {str(dim): 0 for dim in table.dims if dim in MESH_DIMENSIONS and bool((table == table.isel({dim: 0})).all())}
+    return _linked(add_ratios(dataset.set_coords(_PLACE if path else ()), plan))
 
 
 def _records_of(
@@ -279,47 +270,6 @@ def _along(place: xr.DataArray, own: Collection[str]) -> xr.DataArray:
         if dim not in own and bool(((place == first) | (place.isnull() & first.isnull())).all()):
             place = first
     return place
-
-
-def _add_ratios(dataset: xr.Dataset, plan: Plan) -> xr.Dataset:
-    """Add F_max, F/F_max and speed-up: against the full-order case of the same scene and mesh settings."""
-    force, seconds = dataset["force"], dataset["time_total"]
-    full_force = _of_full_order(dataset, "force")
-    if plan.study.gives_force:
-        full_force = full_force * _by_depth(dataset, plan)
-    ratios = {
-        "force_exact_ratio": force / dataset["force_exact"],
-        "force_ratio": force / full_force,
-        "speedup": _of_full_order(dataset, "time_total") / seconds,
-    }
-    for name in ("energy_release", "load_force"):
-        if name in dataset:
-            ratios[f"{name}_ratio"] = dataset[name] / _of_full_order(dataset, name)
-    if "law" in dataset.dims and "linear" in dataset["law"].values:
-        ratios["linear_ratio"] = force / force.sel(law="linear", drop=True)
-    ratios = {name: values.transpose(*force.dims, missing_dims="ignore") for name, values in ratios.items()}
-    full = {"epsilon": int(np.argmax(dataset["epsilon"].values))} if "epsilon" in dataset.dims else {}
-    alike = {} if plan.study.gives_force else _shared(plan.study, plan.keys, full)
-    ratios["force_max"] = full_force.isel(alike, drop=True)
-    return dataset.assign({name: values.assign_attrs(attributes(name)) for name, values in ratios.items()})
-
-
-def _by_depth(dataset: xr.Dataset, plan: Plan) -> xr.DataArray:
-    """Return the factor of the full order's force from its own depth to that of each case, by F's power of the depth.
-
-    At one force the depths of meshes differ; F_max is the force at the same depth.
-    """
-    powers = [found.exponent if (found := plan.depths_at_force.get(i)) else nan for i in plan.study.indices()]
-    power = dataset["depth"].copy(data=np.array(powers).reshape(dataset["depth"].shape))
-    return (dataset["depth"] / _of_full_order(dataset, "depth")) ** power
-
-
-def _of_full_order(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return a variable of the full-order case of the same scene and mesh settings."""
-    values = dataset[name]
-    if "epsilon" in values.dims:
-        return at_full_order(values)
-    return values.where(bool(dataset.attrs["epsilon_is_full"]))
 
 
 def _linked(dataset: xr.Dataset) -> xr.Dataset:
