@@ -1,4 +1,4 @@
-"""Bodies that touch more than the tool: lift-off from a support, two jaws, and their slip when they are pulled."""
+"""Bodies that touch more than the tool: supports, loose layers, two jaws, and their slip when they are pulled."""
 
 from collections.abc import Iterator
 from math import pi, sqrt
@@ -21,13 +21,19 @@ _WEIGHT = 1e-3
 # Of jaws on a body that is no half-space; of the directions of friction, which differ a bit.
 _FINITE, _ALIGNED = 2e-2, 1e-3
 _FRICTION = 0.3
+_TOGETHER = {"together": "grasp"}
+_GRAVITY, _DENSITY = 9.81, 1060.0
+# Of a strip as a beam, whose overhang is ten times its thickness; of forces that the solver balances.
+_BEAM, _BALANCED = 3e-2, 1e-7
 _LIGHT = {"gravity": ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]}
 
 
 def contacts_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
     """Yield the rows of several contacts; collective."""
     yield _lift_off(comm)
+    yield from _loose(comm)
     if not quick:
+        yield _on_a_ridge(comm)
         yield from _grasps(comm)
         yield _between_balls(comm)
         yield from _pulled(comm)
@@ -49,7 +55,7 @@ def _ball(radius: float, depth: float) -> Section:
 
 
 def _jaws(tool: Section) -> list[Section]:
-    return [tool | {"together": "grasp"}, {"together": "grasp"}]
+    return [tool | _TOGETHER, _TOGETHER | {}]
 
 
 def _lift_off(comm: MPI.Comm) -> Row:
@@ -63,6 +69,39 @@ def _lift_off(comm: MPI.Comm) -> Row:
     return Row("layer on a smooth plane, edge of lift-off (m)", "3D", reference, known.KEER, value, bar, _RECEDING)
 
 
+def _on_a_ridge(comm: MPI.Comm) -> Row:
+    """Length over which each end of a heavy strip stays clear of a round support below its middle."""
+    thick, wide, radius, young = 2.0, 2.0, 1e3, 6.24e6  # mm, Pa
+    support = {"on": "bottom", "shape": "cylinder", "radius": mm(radius), "direction": [0, 1, 0]}
+    disc = {"shape": "disc", "radius": "0.7 mm", "depth": "0.00005 mm", "contact": "unilateral"}
+    sizes = _sizes(0.03, 1) | {"growth": 0.5}
+    material = tissue(0.0, 1e-3 * young) | {"density": f"{_DENSITY} kg/m^3"}
+    found = _record(
+        comm, box(96, wide, thick, "none") | {"support": support}, disc, sizes, material=material, load=_LIGHT
+    )
+    value = found.largest["lift_off_area"] / (2e-3 * wide)
+    bar = found.largest["lift_off_area_error"] / found.largest["lift_off_area"]
+    reference = known.overhang(young, 1e-3 * thick, _DENSITY * _GRAVITY, 1e-3 * radius)
+    name = "heavy strip on a round support, length that is clear (m)"
+    return Row(name, "3D", reference, known.TIMOSHENKO, value, bar, _BEAM, found.message)
+
+
+def _loose(comm: MPI.Comm) -> Iterator[Row]:
+    """A heavy layer that lies loose on tissue: how far both sink under their weight, and what the contact carries."""
+    upper, lower, weight = 8e-3, 12e-3, _DENSITY * _GRAVITY
+    heavy = {"density": f"{_DENSITY} kg/m^3"}
+    flap = {"name": "flap", "thickness": "8 mm", "contact": "unilateral", "friction": 0} | tissue(0.0, 20) | heavy
+    body, material = box(40, 40, 20) | {"layer": [flap]}, tissue(0.0) | heavy
+    found = _record(comm, body, _ball(5, 0.5), _sizes(1, 5) | {"growth": 0.8}, material=material, load=_LIGHT)
+    sag = weight * (upper**2 / 2 / 20e3 + (upper * lower + lower**2 / 2) / 10e3)
+    yield Row("loose layer on tissue, sag under their weight (m)", "3D", sag, "columns", found.sag, _BALANCED)
+    carried = found.force + weight * upper * 40e-3**2
+    yield Row(
+        "loose layer on tissue, force between them", "3D", carried, "F and weight",
+        found.largest["interface_force"], _BALANCED,
+    )  # fmt: skip
+
+
 def _grasps(comm: MPI.Comm) -> Iterator[Row]:
     """A grasp that is symmetric about the middle, beside one tool on half of the body."""
     disc = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": "unilateral"}
@@ -74,6 +113,12 @@ def _grasps(comm: MPI.Comm) -> Iterator[Row]:
             f"block between two {name}", "3D", one.force, "half of it on a smooth plane",
             both.force, both.force_error, one.force_error + _WEIGHT, both.message or one.message,
         )  # fmt: skip
+
+    both = _record(comm, box(40, 40, 20, "none"), [*_jaws(disc)[:1], _ball(5, 0.3) | _TOGETHER], _sizes(0.3, 5))
+    yield Row(
+        "block between a disc and a ball: F of the ball", "3D", both.force, "F of the disc",
+        both.largest["jaw_force"], _BALANCED, message=both.message,
+    )  # fmt: skip
 
 
 def _between_balls(comm: MPI.Comm) -> Row:

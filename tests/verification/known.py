@@ -62,6 +62,7 @@ KEER = "L. M. Keer, J. Dundurs and K. C. Tsai, J. Appl. Mech. 39, 1115 (1972): i
 SPENCE = "D. A. Spence, Proc. R. Soc. A 305, 55 (1968)"
 COULOMB = "C. A. Coulomb (1785)"
 MINDLIN = "R. D. Mindlin, J. Appl. Mech. 16, 259 (1949)"
+TIMOSHENKO = "S. P. Timoshenko's beam, Phil. Mag. 41, 744 (1921)"
 GALIN = "L. A. Galin, Contact Problems (1961)"
 # Quadrature of tissue that sticks: points, and the end of the integral, whose integrand falls like exp(-2 x).
 _POINTS, _FARTHEST = 200, 20.0
@@ -267,3 +268,14 @@ def receding_radius() -> float:
         return float(np.linalg.norm(system @ shares + columns[:, 0]))
 
     return float(minimize_scalar(uneven, bounds=(0.9, 1.4), method="bounded").x)
+
+
+def overhang(young: float, thickness: float, weight: float, radius: float) -> float:
+    """Return the length (m) of a heavy strip beyond a round support with this ``radius`` (m) below its middle.
+
+    It is a beam of ``thickness`` h (m) and ``weight`` (N/m³), with ν = 0, at small slopes. Far within the contact the
+    bending moment is E I / R. Towards its end it falls by λ times the shear force: the slope has no kink there. λ² is
+    E I / (k G A) of Timoshenko's beam, k = 5/6. With the load q and the length c, q c² / 2 + q c λ = E I / R.
+    """
+    bent, decay = young * thickness**2 / (12 * weight * radius), thickness / sqrt(5)
+    return sqrt(decay**2 + 2 * bent) - decay
