@@ -86,7 +86,13 @@ def test_of_repeats_the_middle_one_counts():
     assert (third.seconds, third.cpu, third.all_seconds) == (0.3, 0.15, (0.2, 0.9, 0.3))
 
 
-@pytest.mark.parametrize("name", TASKS)
+# Of each kind of contact one by day.
+BY_DAY = ("blade", "ball", "deep-ball")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in BY_DAY else pytest.mark.nightly) for name in TASKS]
+)
 def test_this_program_gets_the_truth(name):
     answer = program.solve(TASKS[name], 1, accuracy="2 %")
     assert answer.force == pytest.approx(TASKS[name].truth[0], rel=0.02)

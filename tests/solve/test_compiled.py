@@ -13,7 +13,7 @@ from dolfinx import fem
 
 from epsmesh import compat
 from epsmesh.solve import compiled
-from epsmesh.solve.compiled import compiling, form, form_cache, scalar_space, vector_space
+from epsmesh.solve.compiled import FLAGS, compiling, form, form_cache, scalar_space, vector_space
 from epsmesh.solve.kernels.assembly import cell_kernel
 from epsmesh.solve.kernels.native import call
 from tests.solve.test_mixed import make_mesh
@@ -70,7 +70,7 @@ def test_a_plain_form_has_the_generated_kernel(degree):
     expression = stiffness(space)
     address = cell_kernel(degree, of_regions=False)
     own = form(expression, kernels={compat.EVERYWHERE: address})
-    jit = {"cache_dir": str(form_cache()), "cffi_extra_compile_args": ["-O2", "-march=native"]}
+    jit = {"cache_dir": str(form_cache()), "cffi_extra_compile_args": list(FLAGS)}
     key = "jit_options" if "jit_options" in inspect.signature(fem.form).parameters else "jit_params"
     plain = fem.form(expression, **{key: jit})
     assert first_kernel(plain) != address
