@@ -50,7 +50,9 @@ def test_a_ball_that_is_a_support_is_one_that_is_a_jaw(material):
 @pytest.mark.parametrize(("shape", "hollow", "friction"), [(*kind, 0) for kind in SHAPES] + [("sphere", False, 0.2)])
 def test_forces_of_tool_support_and_weight_balance(shape, hollow, friction, material):
     body = on_a(shape, RADII[shape], friction, hollow=hollow)
-    found = one(probe=BALL, body=body, material=material | HEAVY["material"], load=GRAVITY, mesh=ROUGH)
+    found = one(
+        probe=BALL, body=body, material=material | HEAVY["material"], load=GRAVITY, mesh=ROUGH if friction else {}
+    )
     assert found.status == "ok", found.message
     assert found.balance < 1e-6
     assert found.largest["support_force"] == pytest.approx(found.force + WEIGHT, rel=1e-5)

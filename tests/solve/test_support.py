@@ -77,7 +77,7 @@ def test_a_capsule_within_the_body_holds_it_no_more_than_the_support_does(tensio
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
 def test_friction_of_the_support_is_between_none_and_sticking(material):
     smooth, least, some, more, most, stuck = (
-        one(probe=BALL, body=on(friction), material=material, mesh=ROUGH)
+        one(probe=BALL, body=on(friction), material=material, mesh=ROUGH | {"fine": "7 mm", "coarse": "7 mm"})
         for friction in (0, 1e-3, 0.1, 0.3, 2.0, "stick")
     )
     assert smooth.force < least.force < some.force < more.force < most.force
@@ -85,7 +85,7 @@ def test_friction_of_the_support_is_between_none_and_sticking(material):
     assert most.force == pytest.approx(stuck.force, rel=1e-7)
     assert more.balance < 1e-8
     lifted = [each.largest["lift_off_area"] for each in (smooth, least, some, more)]
-    assert np.diff(lifted).max() < 1e-9 * 40e-3**2
+    assert lifted == sorted(lifted, reverse=True)
 
 
 @pytest.mark.parametrize("material", [{}, LARGE], ids=["linear", "large"])
