@@ -113,7 +113,8 @@ def _other_proportions(study: Study, dice: random.Random, folder: Path) -> Study
 
 def _other_contacts(study: Study, dice: random.Random, folder: Path) -> Study:
     """Return the study with other jaws, pulls, friction and holds, each where the study remains one."""
-    for is_drawn, changes in _of_support(study, dice) if "support" in study["body"] else _of_jaws(study, dice):
+    changes_of = _of_support if "support" in study["body"] else _of_jaws if len(tools(study)) > 1 else _of_layers
+    for is_drawn, changes in changes_of(study, dice):
         changed = study | {name: _with(study[name], part) for name, part in changes.items()}
         if is_drawn and seconds(changed, folder) <= _CHOSEN_LONG and not _slides_away(changed, folder):
             study = changed
@@ -130,6 +131,14 @@ def _with(part: Any, changes: Any) -> Any:
 def _of_support(study: Study, dice: random.Random) -> _Changes:
     friction = dice.choice(_OF_SUPPORTS)
     return ((True, {"body": {"support": study["body"]["support"] | {"friction": friction}}}),)
+
+
+def _of_layers(study: Study, dice: random.Random) -> _Changes:
+    """Return changes of the loose layer of a study, if it has one."""
+    layers = study["body"].get("layer", [])
+    friction = {"friction": dice.choice(_OF_SUPPORTS)}
+    changed = [layer | (friction if layer.get("contact") == "unilateral" else {}) for layer in layers]
+    return ((_loose(study) is not None, {"body": {"layer": changed}}),)
 
 
 def _of_jaws(study: Study, dice: random.Random) -> _Changes:
@@ -163,6 +172,8 @@ def _contacts(study: Study) -> dict[str, str]:
     found = {"tool": first["shape"], "friction": friction if friction == "stick" else "some" if friction else "none"}
     if second:
         found |= {"jaws": "different" if {*second[0]} - {"together"} else "equal", "held": str(study["body"]["fixed"])}
+    if (rubs := _loose(study)) is not None:
+        found["layer's friction"] = str(rubs)
     if support := study["body"].get("support"):
         found["support's friction"] = str(support["friction"])
     return found
