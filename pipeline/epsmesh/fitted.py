@@ -140,6 +140,8 @@ AT_SHARP_END: Annotated[float, Fit("share of the contact at sharp ends", _DEEP, 
 FOUND_LARGE: Annotated[Range, Fit("F_2 - F_3", _DEEP, "2026-11-27")] = (1.08, 0.35)
 FOUND_LARGE_AT_EDGE: Annotated[float, Fit("relative bar on the area", _DEEP, "2026-11-27")] = 0.12
 FOUND_LARGE_DEGREE: Annotated[int, Fit("degree of the elements", _DEEP, "2026-11-27")] = 2
+# The same where a linear law has contact found again below flat tools, or a flat one and a ball that close on a body.
+FOUND_FLAT: Annotated[Range, Fit("F_2 - F_3", _ASKED, "2026-11-30")] = (1.2, 0.75)
 # The bar on the area, for the size of elements at the contact's edge.
 AREA: Annotated[float, Fit("area of nodes that share a facet with the contact's edge", _COVERAGE, "2026-11-24")] = 0.07
 # A depth between two that have bars has the larger of both, times this: contact gains whole nodes, and bars jump.

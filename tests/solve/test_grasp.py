@@ -9,7 +9,7 @@ from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
 from epsmesh.study.read import parse
-from tests.cases import NO_SIZES, raw, refusal, solve
+from tests.cases import raw, refusal, solve
 
 DISC: dict[str, Any] = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": "unilateral"}
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.3 mm", "contact": "unilateral"}
@@ -159,7 +159,6 @@ def test_a_body_that_jaws_do_not_hold_fails_and_says_along_which_axis():
         (grasp(DISC | {"contact": "bonded"}), "contacts of both jaws are found together"),
         (grasp(BALL, DISC | {"contact": "bonded"}), 'probe[2].contact = "bonded": must be "unilateral" in a grasp'),
         (grasp(BALL, material={"density": "1000 kg/m^3"}, load=LIGHT), "before both jaws touch it"),
-        (grasp(BALL, mesh=NO_SIZES | {"accuracy": "1 %"}), "give sizes"),
         (grasp(DISC | {"edge": "0.5 mm"}, {"edge": 0.0}, material=LARGE), "edge"),
         (grasp(DISC, material=LARGE), "rounded edge"),
         (grasp(BALL | {"history": {"ramp": "1 s", "hold": "1 s"}}, material=LARGE), "two jaws do not close"),

@@ -128,7 +128,7 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
     scene = Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds)
     if jaw is None:
         return scene, sizes
-    sizes = replace(sizes, jaw_rim=case.mesh.rim_size(jaw.half_width))
+    sizes = replace(sizes, jaw_rim=case.mesh.jaw_rim_size(jaw.half_width))
     return replace(scene, jaw=jaw, jaw_segments=sizes.of_jaw.rim_segments(jaw)), sizes
 
 

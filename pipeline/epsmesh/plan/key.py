@@ -26,7 +26,7 @@ from epsmesh.study.schema import Material, Mesh
 from epsmesh.units import canonical
 
 # Raise by hand when the same input gives another force: earlier records are then no longer used.
-PHYSICS_VERSION = 22
+PHYSICS_VERSION = 23
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")
@@ -304,6 +304,7 @@ def _written(mesh: Mesh, given_keys: frozenset[str], is_full: bool, half_width: 
             content = {"epsilon": mesh.epsilon, "coarse": mesh.coarse, "outside": mesh.outside}
         content |= {"fine": mesh.fine, "rim": mesh.rim_size(half_width), "growth": mesh.growth}
         content |= {"coarseness": mesh.coarseness} if mesh.coarseness else {}
+        content |= {"jaw_rim": mesh.jaw_rim} if mesh.jaw_rim else {}
         if element:
             content |= {"degree": mesh.degree, "element": element}
     return _text(content)

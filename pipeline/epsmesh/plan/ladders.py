@@ -123,6 +123,8 @@ BALL_LARGE = (
     Recipe(2, 0.08, 0.17, 1.15e-3),
     Recipe(2, 0.06, 0.14, 8.6e-4),
 )
+# With a linear law, contact that is found again in one degree more may be a node's more or less on larger elements.
+BALL_AGAIN = BALL_LARGE[2:]
 # At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
 LARGE = (
     *LADDER[:4],

@@ -15,6 +15,8 @@ from epsmesh.plan.ladders import Recipe
 from epsmesh.plan.symmetry import mirror_planes, movement_planes
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import is_level
+from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.support import NONE
 from epsmesh.study.case import Case
 from epsmesh.study.check_mesh import held_gaps
 from epsmesh.study.schema import Mesh
@@ -57,6 +59,8 @@ _SQUEEZED = 1.5
 # Expected bar of friction: this share of what sticking adds to the force of a flat disc, or of other tools, but at most
 # so much times the coefficient; benchmarks/results/friction.md.
 _OF_STICKING, _OF_CURVED, _OF_COEFFICIENT = 0.2, 0.55, 0.04
+# Error bars of contact that is found again in one degree more, where no limit is known, in units of those of FLAT.
+_FOUND_AGAIN = 2.2
 # Number of elements between the probe's edge and a fixed face.
 _ACROSS_GAP = 3
 # Elements on far regions are larger where the expected error bar is above the first value, in so many steps, which let
@@ -85,6 +89,8 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
     rungs: dict[Mesh, Rung] = {}
     for number in tried:  # several recipes give one mesh where the study gives the rest
         mesh = _mesh(case, ladder[number])
+        if case.jaw is not None:
+            mesh = _with_jaw(case, case.jaw, mesh, ladder[number])
         rung = Rung(mesh.with_far_regions(_coarseness(case, mesh, expected[number])), expected[number])
         rungs.setdefault(rung.mesh, rung)
     return tuple(rungs.values())
@@ -109,14 +115,13 @@ def _ladder(case: Case) -> tuple[Recipe, ...]:
     if not case.probe.is_flat:
         if not case.way.is_nonlinear:
             return ladders.BALL if has_sure_contact(case) else ladders.FOUND[case.way.element]
-        ball = case.probe.hertz_radius if is_ball(case) and case.is_plain and not case.way.rubs else None
-        return ladders.FOUND_LARGE if ball is None or case.probe.depth > _SHALLOW * ball else ladders.BALL_LARGE
+        return _of_balls(case, case.probe)
     if not case.has_quarter_points:
         return ladders.DEEP
+    if case.way.is_found and not case.way.is_large:
+        return ladders.FLAT
     if case.way.is_nonlinear:
         return ladders.LARGE
-    if case.way.is_found:
-        return ladders.FLAT
     if case.is_plain:
         return ladders.EVEN
     return ladders.LADDER if is_level(case.body, case.frame) else ladders.ROUND
@@ -134,7 +139,7 @@ def edge_width_of(case: Case) -> float:
 
 def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     """Return the expected relative error bars of recipes for a case."""
-    shape = case.probe.EXPECTED_ERROR
+    shape = max(tool.EXPECTED_ERROR for tool in _tools(case))
     if mirror_planes(case) == movement_planes(case):
         shape *= 1 + _SLIDE * _slide(case)
     if not case.is_plain:
@@ -146,10 +151,12 @@ def _expected(case: Case, ladder: Sequence[Recipe]) -> list[float]:
     locking = 1.0 if case.way.is_mixed else ((1 - 2 * case.poisson) / 0.4) ** -_LOCKING
     if not case.probe.is_flat:  # elements in a thin body are small anyway
         return [float(recipe.bar * shape * locking) for recipe in ladder]
+    if ladder is ladders.FLAT and case.way.is_nonlinear and not _has_limit(case):
+        shape *= _FOUND_AGAIN
     is_even = ladder is ladders.EVEN
-    thin = min(half_width_of(case) / case.body.thickness(case.frame), _THINNEST)
+    thin = min(half_width_of(case) / _thickness(case), _THINNEST)
     shape *= locking * (1 + (_THICKNESS_EVEN if is_even else _THICKNESS) * thin)
-    of_degree = _MIXED_LARGE if case.way.is_nonlinear else _MIXED_FLAT if ladder is ladders.FLAT else _MIXED
+    of_degree = _MIXED_FLAT if ladder is ladders.FLAT else _MIXED_LARGE if case.way.is_nonlinear else _MIXED
     if case.way.element == "displacement":
         of_degree = dict.fromkeys(_MIXED, 1.0)
     if is_even and not has_sure_limit(case):
@@ -186,10 +193,54 @@ def has_sure_limit(case: Case) -> bool:
 
 def is_ball(case: Case) -> bool:
     """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
-    if (radius := case.probe.hertz_radius) is None or not case.way.is_nonlinear:
-        return radius is not None
+    radii = [radius for tool in _tools(case) if (radius := tool.hertz_radius) is not None]
+    if len(radii) < len(_tools(case)) or not case.way.is_nonlinear:
+        return bool(radii)
     gaps = held_gaps(case.body, case.probe, case.mesh).values()
-    return not case.way.in_time and all(gap >= _FROM_HELD * radius for gap in gaps)
+    return not case.way.in_time and all(gap >= _FROM_HELD * max(radii) for gap in gaps)
+
+
+def has_flat(case: Case) -> bool:
+    """Return whether F has the limit of flat tools on a support, or of jaws that are flat, or one of them a ball."""
+    is_second = case.jaw is not None or case.body.resting is not None
+    if not is_second or case.terms or case.way.is_large or case.way.in_time:
+        return False
+    flat = [tool.is_flat for tool in _tools(case)]
+    return any(flat) and all(tool.is_flat or tool.hertz_radius is not None for tool in _tools(case))
+
+
+def is_closed(case: Case) -> bool:
+    """Return whether nothing but the tool, its opposite and dead loads carries a force along the axis."""
+    return case.body.fixed == NONE and not case.terms
+
+
+def is_sure_opposite(case: Case) -> bool:
+    """Return whether the limit of F does not depend on how the support that lets go of the body is resolved."""
+    return case.body.resting is None or (case.body.resting.is_flat and is_closed(case))
+
+
+def _has_limit(case: Case) -> bool:
+    """Return whether the limit of F is known where Newton's method finds its contact: see :mod:`.solve.estimate`."""
+    is_known = is_ball(case) or has_flat(case)
+    return is_known and case.is_plain and is_sure_opposite(case) and not case.way.rubs
+
+
+def _of_balls(case: Case, tool: Probe) -> tuple[Recipe, ...]:
+    """Return the recipes for a tool whose width of contact is found by Newton's method: larger elements for balls."""
+    radius = tool.hertz_radius
+    if radius is None or not _has_limit(case) or tool.depth > _SHALLOW * radius:
+        return ladders.FOUND_LARGE
+    return ladders.BALL_LARGE if case.way.is_large else ladders.BALL_AGAIN
+
+
+def _tools(case: Case) -> tuple[Probe, ...]:
+    return (case.probe,) if case.jaw is None else (case.probe, case.jaw)
+
+
+def _thickness(case: Case) -> float:
+    """Return the thickness (m) below the tool; of two jaws, each has half of the body."""
+    thickness = case.body.thickness(case.frame)
+    return thickness if case.jaw is None else thickness / 2
 
 
 def has_sure_contact(case: Case) -> bool:
@@ -203,7 +254,7 @@ def has_sure_contact(case: Case) -> bool:
 
 def is_thin(case: Case) -> bool:
     """Return whether the body is so thin for the contact that the limit of F is less sure than on a deep one."""
-    return case.body.thickness(case.frame) < _SQUEEZED * half_width_of(case)
+    return _thickness(case) < _SQUEEZED * half_width_of(case)
 
 
 def _near(case: Case) -> float:
@@ -233,7 +284,7 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
     reach = case.body.reach(case.frame) + thickness
     gaps = held_gaps(case.body, probe, given).values()
     sizes = {
-        "fine": min(thickness / _THROUGH, reach),
+        "fine": min(_thickness(case) / _THROUGH, reach),
         "coarse": reach,
         "rim": min([recipe.rim * edge_width_of(case), *(gap / _ACROSS_GAP for gap in gaps)]),
         "growth": recipe.growth,
@@ -247,3 +298,19 @@ def _mesh(case: Case, recipe: Recipe) -> Mesh:
         chosen["epsilon"] = probe.circumradius + thickness
         chosen["outside"] = "coarse"
     return given.model_copy(update=chosen | {"accuracy": None})
+
+
+def _with_jaw(case: Case, jaw: Probe, mesh: Mesh, recipe: Recipe) -> Mesh:
+    """Return the ``mesh`` of a recipe with the element size at the edge of a second ``jaw``.
+
+    It is in proportion to the jaw's own contact. A jaw of another kind has the recipe of its kind with the same bar.
+    """
+    if "rim" in case.mesh.model_fields_set or mesh.rim is None:
+        return mesh
+    if jaw.is_flat != case.probe.is_flat:
+        ladder = ladders.FLAT if jaw.is_flat else _of_balls(case, jaw)
+        recipe = next((one for one in ladder if one.bar <= recipe.bar), ladder[-1])
+        if "growth" not in case.mesh.model_fields_set:
+            mesh = mesh.model_copy(update={"growth": min(mesh.growth, recipe.growth)})
+    gaps = held_gaps(case.body, jaw, case.mesh).values()
+    return mesh.with_jaw_rim(min([recipe.rim * jaw.edge_width, mesh.fine, *(gap / _ACROSS_GAP for gap in gaps)]))

@@ -8,7 +8,17 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.plan.cost import features
-from epsmesh.plan.recipe import edge_width_of, half_width_of, has_sure_contact, has_sure_limit, is_ball, is_thin
+from epsmesh.plan.recipe import (
+    edge_width_of,
+    half_width_of,
+    has_flat,
+    has_sure_contact,
+    has_sure_limit,
+    is_ball,
+    is_closed,
+    is_sure_opposite,
+    is_thin,
+)
 from epsmesh.plan.refinement import is_refined
 from epsmesh.plan.steps import Solve
 from epsmesh.run.record import Record
@@ -16,6 +26,7 @@ from epsmesh.run.tools import normal_of
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
+from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.solve.contact_result import ContactResult, PullResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import is_fine, is_graded, unresolved
@@ -95,9 +106,11 @@ def convergence_of(solve: Solve) -> Convergence:
         element=case.way.element,
         is_graded=is_graded_to_contact(case),
         is_fine=is_plain and has_sure_limit(case) and is_fine(_rim(case), case.mesh.growth),
-        has_others=not is_plain,
+        has_others=not is_plain or (case.body.resting is not None and not is_sure_opposite(case)),
         is_nonlinear=case.way.is_nonlinear,
         is_ball=is_ball(case),
+        is_flat=has_flat(case),
+        is_closed=MIDDLE in solve.mirrors or is_closed(case),
     )
 
 
@@ -261,8 +274,9 @@ def is_graded_to_contact(case: Case) -> bool:
             return False
         if is_ball(case) and not case.way.is_nonlinear and is_thin(case):
             return False
-    sure = has_sure_contact(case) and case.mesh.degree == 2
-    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_nonlinear, sure=sure)
+    # What Newton's method finds with a linear law needs smaller elements than at large displacements.
+    sure = (has_sure_contact(case) or case.way.is_nonlinear) and case.mesh.degree == 2
+    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_large, sure=sure)
 
 
 def least_bar(solve: Solve) -> float:
@@ -274,7 +288,7 @@ def least_bar(solve: Solve) -> float:
 def size_at_contact(case: Case) -> float:
     """Return the size of elements at the edge of contact, in units of its expected half width; of jaws, the larger."""
     size = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
-    return size if case.jaw is None else max(size, case.mesh.rim_size(case.jaw.half_width) / case.jaw.contact_width)
+    return size if case.jaw is None else max(size, case.mesh.jaw_rim_size(case.jaw.half_width) / case.jaw.contact_width)
 
 
 def _rim(case: Case) -> float:

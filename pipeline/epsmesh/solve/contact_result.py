@@ -69,6 +69,13 @@ class ContactResult:
         pull = None if self.pull is None else self.pull.with_least_bar(share)
         return replace(self, bar=max(self.bar, share), rest=rest, pull=pull)  # max(nan, share) is NaN
 
+    def with_opposite(self, change: float, bar: float) -> "ContactResult":
+        """Return the contact whose opposite carries a ``change`` of F (N), too, and has the relative ``bar`` of F."""
+        rest = self.rest
+        assert rest is not None
+        x, y, z = (force + change * n for force, n in zip(rest.force, rest.normal, strict=True))
+        return replace(self, rest=replace(rest, force=(x, y, z), force_bar=bar))
+
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.
 

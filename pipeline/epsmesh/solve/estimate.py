@@ -157,8 +157,8 @@ def extrapolate_found(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limit of F / d (1, 1) of unilateral contact, and its bar.
 
-    The middle of its known error is subtracted from F; where one degree more raises F, F and its bar stay. At large
-    displacements the limit is known for balls only.
+    The middle of its known error is subtracted from F; where one degree more raises F, F and its bar stay. Where
+    Newton's method finds the contact, the limit is known for balls, and below flat tools of linear laws.
     """
     if known.is_nonlinear:
         return _extrapolate_found_large(stiffness, decrements, bars, known)
@@ -176,10 +176,11 @@ def extrapolate_found(
 def _extrapolate_found_large(
     stiffness: FloatArray, decrements: FloatArray, bars: FloatArray, known: Convergence
 ) -> tuple[FloatArray, FloatArray]:
-    is_known = known.is_ball and known.degree == fitted.FOUND_LARGE_DEGREE and known.is_graded
+    is_known = (known.is_ball or known.is_flat) and known.degree == fitted.FOUND_LARGE_DEGREE and known.is_graded
     if not is_known or known.has_others or known.friction_bar or decrements[0, 0] <= 0:
         return stiffness, bars
-    (centre, spread), change = fitted.FOUND_LARGE, fitted.FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`
+    centre, spread = fitted.FOUND_LARGE if known.is_ball else fitted.FOUND_FLAT
+    change = fitted.FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`
     least = fitted.FOUND_LARGE_AT_EDGE * known.at_edge * np.abs(stiffness)
     return stiffness - centre * change, np.maximum(spread * change, least)
 

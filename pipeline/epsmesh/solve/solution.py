@@ -189,7 +189,11 @@ class Solution:
                 known, is_ended=contact.is_ended, friction_bar=contact.friction_bar, at_edge=contact.at_edge
             )
             stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
-            return replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
+            best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
+            if contact.rest is None or not known.is_closed:
+                return best
+            force, bar = best.reaction[2], best.reaction_bars[2]
+            return replace(best, contact=contact.with_opposite(force - self.reaction[2], bar / abs(force)))
         stiffness, bars = extrapolate(self.stiffness, self.decrements, self.bars, known, self.unseen)
         best = replace(
             self,

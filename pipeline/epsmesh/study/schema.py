@@ -194,6 +194,7 @@ class Mesh(Section):
 
     # No key: recipes set it.
     _coarseness: float = PrivateAttr(default=0.0)
+    _jaw_rim: float | None = PrivateAttr(default=None)
 
     @property
     def coarseness(self) -> float:
@@ -205,6 +206,21 @@ class Mesh(Section):
         found = self.model_copy()
         found._coarseness = coarseness
         return found
+
+    @property
+    def jaw_rim(self) -> float | None:
+        """Element size (m) at the edge of a second jaw, if that is another one than at the tool's."""
+        return self._jaw_rim
+
+    def with_jaw_rim(self, size: float) -> Self:
+        """Return the mesh with that :attr:`jaw_rim`."""
+        found = self.model_copy()
+        found._jaw_rim = size
+        return found
+
+    def jaw_rim_size(self, half_width: float) -> float:
+        """Element size at the edge of a second jaw of that half width (m)."""
+        return self.rim_size(half_width) if self._jaw_rim is None else self._jaw_rim
 
     def rim_size(self, half_width: float) -> float:
         """Element size at the edge of a probe of that half width (m)."""

@@ -270,11 +270,6 @@ REFUSALS: tuple[Refusal, ...] = (
         'must be "unilateral" on a support that lets go: the contacts of tool and support are found together',
     ),
     Refusal(
-        "support that lets go",
-        "accuracy",
-        "has an edge where tissue lifts off, which meshes for an accuracy do not refine: give sizes",
-    ),
-    Refusal(
         "support with a path of friction",
         "tension of the capsule",
         'must be 0, or "stick" on a plane, with a capsule that is stretched before: how tissue slides while it '
@@ -312,7 +307,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
     Refusal("loose layer", "grasp", "is not computed with two jaws: omit `together`"),
     Refusal("loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
-    Refusal("loose layer", "accuracy", "has an edge of contact that meshes for an accuracy do not refine: give sizes"),
     Refusal("loose layer", "region", "is parted in meshes of boxes and cylinders alone: use an inclusion, or omit it"),
     Refusal("loose layer", "capsule on the surface", "would be held by the capsule around it: omit one of the two"),
     *(
@@ -340,8 +334,8 @@ REFUSALS: tuple[Refusal, ...] = (
         "pull of a body that is not held",
         'would move the whole body without force: give body.fixed, such as "sides"',
     ),
+    Refusal("pull", "accuracy", "has bars of its steps, which finer meshes keep: give sizes"),
     Refusal("support that lets go", "grasp", "is not computed with two jaws: give body.fixed, or omit `together`"),
-    Refusal("grasp", "accuracy", "has two contacts, for which meshes of an accuracy are not made: give sizes"),
     Refusal("loads", "grasp", f"would move the body before both jaws touch it: {_NO_LOADS}, or omit `together`"),
     Refusal("region", "grasp", "is meshed from triangles, without a second jaw: use an inclusion, or omit `together`"),
     Refusal("capsule on the surface", "grasp", _GRASPED),
