@@ -135,12 +135,15 @@ AT_EDGE_LARGE: Annotated[dict[int, float], Fit("relative bar on the area", _DEEP
 # it, so that F lacks a part of that strip, of which one degree more sees little. Errors against meshes four times
 # finer, which lack a quarter as much, were up to 0.19 of it.
 AT_SHARP_END: Annotated[float, Fit("share of the contact at sharp ends", _DEEP, "2026-11-28")] = 0.3
+# The same with a linear law, which leaves nodes where they were: what one degree more does not see if another contact's
+# change cancels that at the end. Errors were up to 0.065 of it.
+AT_SHARP_END_LINEAR: Annotated[float, Fit("share of the contact at sharp ends", _ASKED, "2026-11-30")] = 0.075
 # The limit of F there, for balls on plain bodies in one degree: F_2 - (centre ± spread) (F_2 - F_3). The bar is at
 # least a share of the area's bar, which covers what the contact's edge adds by chance.
 FOUND_LARGE: Annotated[Range, Fit("F_2 - F_3", _DEEP, "2026-11-27")] = (1.08, 0.35)
 FOUND_LARGE_AT_EDGE: Annotated[float, Fit("relative bar on the area", _DEEP, "2026-11-27")] = 0.12
 FOUND_LARGE_DEGREE: Annotated[int, Fit("degree of the elements", _DEEP, "2026-11-27")] = 2
-# The same where a linear law has contact found again below flat tools, or a flat one and a ball that close on a body.
+# The same where a linear law has contact found again below a flat tool on a support, or of two flat jaws.
 FOUND_FLAT: Annotated[Range, Fit("F_2 - F_3", _ASKED, "2026-11-30")] = (1.2, 0.75)
 # The bar on the area, for the size of elements at the contact's edge.
 AREA: Annotated[float, Fit("area of nodes that share a facet with the contact's edge", _COVERAGE, "2026-11-24")] = 0.07

@@ -201,12 +201,11 @@ def is_ball(case: Case) -> bool:
 
 
 def has_flat(case: Case) -> bool:
-    """Return whether F has the limit of flat tools on a support, or of jaws that are flat, or one of them a ball."""
+    """Return whether F has the limit of a flat tool on a support, or of two flat jaws."""
     is_second = case.jaw is not None or case.body.resting is not None
     if not is_second or case.terms or case.way.is_large or case.way.in_time:
         return False
-    flat = [tool.is_flat for tool in _tools(case)]
-    return any(flat) and all(tool.is_flat or tool.hertz_radius is not None for tool in _tools(case))
+    return all(tool.is_flat for tool in _tools(case))
 
 
 def is_closed(case: Case) -> bool:
@@ -309,7 +308,8 @@ def _with_jaw(case: Case, jaw: Probe, mesh: Mesh, recipe: Recipe) -> Mesh:
         return mesh
     if jaw.is_flat != case.probe.is_flat:
         ladder = ladders.FLAT if jaw.is_flat else _of_balls(case, jaw)
-        recipe = next((one for one in ladder if one.bar <= recipe.bar), ladder[-1])
+        more = _FOUND_AGAIN if jaw.is_flat else 1.0
+        recipe = next((one for one in ladder if more * one.bar <= recipe.bar), ladder[-1])
         if "growth" not in case.mesh.model_fields_set:
             mesh = mesh.model_copy(update={"growth": min(mesh.growth, recipe.growth)})
     gaps = held_gaps(case.body, jaw, case.mesh).values()

@@ -21,7 +21,6 @@ def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     *_, first = first_touch(case.body, case.probe, case.frame)
     tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case), pull=_pull_of(case))
-    tool = replace(tool, is_sharp=tool.is_sharp and case.way.is_large)  # a linear law leaves tissue where it was
     return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
 
 
@@ -50,8 +49,7 @@ def beds_of(case: Case) -> tuple[Bed, ...]:
     if resting is not None and ground is not None:
         found.append(support_of(_turned(ground, turn), resting.friction))
     if case.jaw is not None:
-        bed = jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth)
-        found.append(replace(bed, is_sharp=bed.is_sharp and case.way.is_large))
+        found.append(jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth))
     if (loose := case.body.loose) is not None:
         level = Ground((0.0, 0.0, loose.height), (0.0, 0.0, 1.0))
         found.append(replace(support_of(_turned(level, turn), loose.friction), is_tissue=True))

@@ -11,7 +11,7 @@ class Convergence:
     graded to the expected edge of contact, and ``is_fine`` that elements are small at the edge of a disc on a plain
     body. ``has_others`` says that F has errors from other places than the probe's edge, ``is_nonlinear`` that
     Newton's method solves it, as at large displacements, and ``is_ball`` that the tool is a ball in unilateral contact,
-    or both jaws are. ``is_flat``: at small displacements, a tool or jaw is flat, and the other one is flat or a ball.
+    or both jaws are. ``is_flat``: at small displacements, a tool on a support, or both jaws, are flat.
     ``is_closed`` says that what else touches the body carries the force of the tool, and nothing else does.
 
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says

@@ -141,9 +141,9 @@ def found_again_bar(
     """Return a decrement and the relative 95 % bar on F_p, from the ``share`` of F that one degree more removes.
 
     Contact is solved again in that degree. The share may vanish by chance, so the bar is at least a fraction
-    ``at_edge`` of ``area_bar``. ``at_end`` is the share of the contact in facets at sharp ends of the tool.
+    ``at_edge`` of ``area_bar``. ``at_end`` is the bar of what one degree more does not see at sharp ends of the tool.
     """
-    bar = max(fitted.FOUND_AGAIN * abs(share), at_edge * area_bar, fitted.AT_SHARP_END * at_end)
+    bar = max(fitted.FOUND_AGAIN * abs(share), at_edge * area_bar, at_end)
     return 2 * share / fitted.FOUND, bar / (1 - min(bar, fitted.MOST))
 
 

@@ -179,7 +179,8 @@ class LargeContactSolution:
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])
-        at_end = max([here.at_sharp_end, *(rest.at_sharp_end for rest in self.rests)])
+        of_end = fitted.AT_SHARP_END_LINEAR if self.body.law.is_linear else fitted.AT_SHARP_END
+        at_end = of_end * max([here.at_sharp_end, *(rest.at_sharp_end for rest in self.rests)])
         degree = self.body.elements.degree
         decrement, bar = found_again_bar(share, at_edge, fitted.AT_EDGE_LARGE[degree], at_end=at_end)
         bar = max([bar, *(rest.unresolved for rest in self.rests)])
