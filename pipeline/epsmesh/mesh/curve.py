@@ -14,9 +14,7 @@ from scipy.sparse import csr_matrix
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.generate import MeshArrays, MeshError, determinants
 from epsmesh.scene.model import FIXED, FREE, JAW, MIRROR, PROBE, Scene
-from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.ovoid import Ovoid
-from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.scanned import Scanned
 from epsmesh.shapes.surface import Surface
 from epsmesh.shapes.triangles import edge_keys
@@ -124,10 +122,10 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
             return middle
         return _on_lifted_rim(mesh, scene, edges, middle)
     on_rim = np.isin(edges, mesh.rim).all(axis=1)
-    if scene.jaw is not None and scene.jaw.is_curved:
-        chosen, frame = on_rim & np.isin(_key(mesh, edges), _facet_edges(mesh, [JAW])), scene.jaw.frame_on(scene.body)
+    if scene.jaw is not None and (scene.jaw.is_curved or isinstance(scene.body, Scanned)):
+        chosen = on_rim & np.isin(_key(mesh, edges), _facet_edges(mesh, [JAW]))
         middle = middle.copy()
-        middle[chosen] = _at_edge(scene.jaw, frame, middle[chosen])
+        middle[chosen] = _at_edge(scene, JAW, middle[chosen])
     both = on_rim & np.isin(_key(mesh, edges), _facet_edges(mesh, [PROBE]))
     if not (scene.probe.is_curved or isinstance(scene.body, Scanned)):
         return middle
@@ -138,18 +136,17 @@ def _on_rim(mesh: MeshArrays, scene: Scene, edges: IntArray, middle: FloatArray)
     middle = middle.copy()
     middle[of_column] = scene.cut_face.project(middle[of_column])
     chosen = both & ~of_column
-    if isinstance(scene.body, Scanned):
-        local = scene.probe.to_edge(scene.frame.local(middle[chosen])[:, :2])
-        middle[chosen], _ = scene.body.lift(scene.frame, local)
-        return middle
-    middle[chosen] = _at_edge(scene.probe, scene.frame, middle[chosen])
+    middle[chosen] = _at_edge(scene, PROBE, middle[chosen])
     return middle
 
 
-def _at_edge(probe: Probe, frame: Frame, points: FloatArray) -> FloatArray:
-    """Return the nearest points (n, 3) of the edge of a plane footprint to ``points`` (n, 3) near it, in m."""
+def _at_edge(scene: Scene, group: str, points: FloatArray) -> FloatArray:
+    """Return the nearest points (n, 3) of a footprint's edge, plane or on triangles, to ``points`` (n, 3) near it."""
+    frame, tool = scene.frame_of(group), scene.tools[group]
     local = frame.local(points)
-    local[:, :2] = probe.to_edge(local[:, :2])
+    local[:, :2] = tool.to_edge(local[:, :2])
+    if isinstance(scene.body, Scanned):
+        return scene.body.lift(frame, local[:, :2])[0]
     return frame.world(local)
 
 

@@ -124,7 +124,7 @@ def _scene(case: Case, *, is_coarse: bool) -> tuple[Scene, Sizes]:
         sizes = replace(sizes, times=times, rim=at_rim * sizes.rim, column=column / times)
     segments = sizes.rim_segments(case.expected)
     held, ball = not (case.mesh.keeps_all or case.mesh.outside == "free"), case.is_closed
-    folds, jaw = not case.has_quarter_points, None if MIDDLE in planes else case.jaw
+    folds, jaw = not case.has_quarter_points, None if MIDDLE in planes else case.expected_jaw
     scene = Scene(case.body, case.expected, _column(case), held, segments, straight, planes, ball, folds)
     if jaw is None:
         return scene, sizes
@@ -155,9 +155,11 @@ def _named(arrays: MeshArrays, case: Case) -> MeshArrays:
 
 
 def _with_linear(arrays: MeshArrays, case: Case) -> MeshArrays:
-    """Give cells beyond ε of the contact the numbers of further regions, in the order of the first ones."""
+    """Give cells beyond ε of all contacts the numbers of further regions, in the order of the first ones."""
     middle = arrays.points[arrays.cells[:, :4]].mean(axis=1)
-    beyond = np.linalg.norm(middle - np.array(case.frame.point), axis=1) > case.mesh.epsilon
+    places = [tool.frame_on(case.body).point for tool in (case.probe, case.jaw) if tool is not None]
+    away = [np.linalg.norm(middle - np.array(place), axis=1) for place in places]
+    beyond = np.min(away, axis=0) > case.mesh.epsilon
     within = 0 if arrays.regions is None else arrays.regions
     return replace(arrays, regions=within + len(case.tissues) * beyond)
 

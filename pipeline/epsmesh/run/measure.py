@@ -287,8 +287,8 @@ def least_bar(solve: Solve) -> float:
 
 def size_at_contact(case: Case) -> float:
     """Return the size of elements at the edge of contact, in units of its expected half width; of jaws, the larger."""
-    size = case.mesh.rim_size(case.probe.half_width) / half_width_of(case)
-    return size if case.jaw is None else max(size, case.mesh.jaw_rim_size(case.jaw.half_width) / case.jaw.contact_width)
+    size, jaw = case.mesh.rim_size(case.probe.half_width) / half_width_of(case), case.expected_jaw
+    return size if jaw is None else max(size, case.mesh.jaw_rim_size(jaw.half_width) / jaw.contact_width)
 
 
 def _rim(case: Case) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from epsmesh.arrays import FloatArray
 from epsmesh.scene.model import FIXED, JAW, LOOSE
-from epsmesh.shapes.contact import first_touch, normal_at_touch
+from epsmesh.shapes.contact import first_touch, is_inclined, normal_at_touch
 from epsmesh.shapes.distance import Distance
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.ground import Ground
@@ -26,10 +26,15 @@ def tool_of(case: Case) -> Tool:
 
 def _pull_of(case: Case) -> Vector | None:
     """Return how far (m) the jaws are pulled, for the same mesh."""
-    pulled, turn = case.probe.pulled, case.frame.turn
-    if pulled is None or turn is None:
-        return pulled
-    x, y, z = map(float, turn @ np.array(pulled))
+    pulled = case.probe.pulled
+    return None if pulled is None else _turned_by(case.frame.turn, pulled)
+
+
+def _turned_by(turn: FloatArray | None, vector: Vector) -> Vector:
+    """Return a vector after a rotation (3, 3) of the body; None is none."""
+    if turn is None:
+        return vector
+    x, y, z = map(float, turn @ np.array(vector))
     return x, y, z
 
 
@@ -49,7 +54,7 @@ def beds_of(case: Case) -> tuple[Bed, ...]:
     if resting is not None and ground is not None:
         found.append(support_of(_turned(ground, turn), resting.friction))
     if case.jaw is not None:
-        found.append(jaw_at(case.jaw, case.jaw.frame_on(case.body).turned_by(turn), case.jaw.depth / case.probe.depth))
+        found.append(_jaw_of(case, case.jaw))
     if (loose := case.body.loose) is not None:
         level = Ground((0.0, 0.0, loose.height), (0.0, 0.0, 1.0))
         found.append(replace(support_of(_turned(level, turn), loose.friction), is_tissue=True))
@@ -60,28 +65,28 @@ def _turned(ground: Ground, turn: FloatArray | None) -> Ground:
     return ground if turn is None else ground.turned(turn)
 
 
-def jaw_at(jaw: Probe, frame: Frame, pace: float) -> Bed:
-    """Return the surface of a second ``jaw`` in its ``frame``, which goes ``pace`` times as far as the tool."""
-    tool = tool_at(jaw, frame, 0.0)
+def _jaw_of(case: Case, jaw: Probe) -> Bed:
+    """Return the surface of the second ``jaw`` of a case, for the same mesh."""
+    body, turn, pace, there = case.body, case.frame.turn, jaw.depth / case.probe.depth, jaw.frame_on(case.body)
+    *_, first = first_touch(body, jaw, there)
+    frame, is_along = there.turned_by(turn), not case.way.is_large and is_inclined(body, jaw, there)
+    tool = tool_at(jaw, frame, first)
     return Bed(
         lambda points, depth: tool.distance(points, pace * depth),
         frame.axis,
-        tool.height,
+        lambda points: tool.height(points) - first,
         tool.friction,
         pace=pace,
         ends_at=tool.ends_at,
         foot=frame.point,
         is_sharp=tool.is_sharp,
+        touched=_turned_by(turn, normal_at_touch(body, jaw, there)) if is_along else None,
     )
 
 
 def normal_of(case: Case) -> Vector:
     """Return the outward unit normal of the surface that the tool of ``case`` first touches, for the same mesh."""
-    normal, turn = normal_at_touch(case.body, case.probe, case.frame), case.frame.turn
-    if turn is None:
-        return normal
-    x, y, z = map(float, turn @ np.array(normal))
-    return x, y, z
+    return _turned_by(case.frame.turn, normal_at_touch(case.body, case.probe, case.frame))
 
 
 def tool_at(probe: Probe, frame: Frame, first: float) -> Tool:

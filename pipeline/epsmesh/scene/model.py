@@ -92,6 +92,10 @@ class Scene:
         """Frame of the probe on the body."""
         return self.probe.frame_on(self.body)
 
+    def frame_of(self, group: str) -> Frame:
+        """Return the frame, on the body, of the tool of a ``group``."""
+        return self.frame if group == PROBE else self.tools[group].frame_on(self.body)
+
     @property
     def scale(self) -> float:
         """Metres in one unit of the model."""

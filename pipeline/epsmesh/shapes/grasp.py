@@ -8,6 +8,7 @@ from epsmesh.shapes.contact import is_flat
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.ovoid import Ovoid
 from epsmesh.shapes.probe import Probe
+from epsmesh.shapes.scanned import Scanned
 from epsmesh.shapes.section import in_mm
 from epsmesh.shapes.support import NONE
 
@@ -27,13 +28,16 @@ _OF_LAYER = frozenset({"name", "thickness", "toughness"})
 
 @lru_cache(_MANY)
 def opposite(body: Body, probe: Probe) -> Probe | None:
-    """Return the second jaw at its place on a ``body``; None if the tool is alone."""
+    """Return the second jaw at its place on a ``body``; None if the tool is alone.
+
+    It closes along the tool's axis, also where the surface is inclined to that; plane faces are parallel.
+    """
     jaw = probe.jaw
     if jaw is None:
         return None
     frame = probe.frame_on(body)
     x, y, z = (p + a * body.thickness(frame) for p, a in zip(frame.point, frame.axis, strict=True))
-    return jaw.model_copy(update={"at": (x, y, z), "axis": None})
+    return jaw.model_copy(update={"at": (x, y, z), "axis": None if isinstance(body, Layered) else frame.outward})
 
 
 def middle_plane(body: Body, probe: Probe) -> tuple[int, float]:
@@ -101,17 +105,18 @@ def check_pull(body: Body, probe: Probe) -> None:
 
 
 def check_opposite(body: Body, probe: Probe) -> None:
-    """Check that the second jaw, if any, is on a plane face, opposite a tool on another one.
+    """Check that the second jaw, if any, is on a plane face opposite a tool on another one, or on scanned triangles.
 
     Raises:
         PlaceError: if not.
     """
     jaw = opposite(body, probe)
-    if jaw is None:
+    if jaw is None or isinstance(body, Scanned):
         return
     frame, own = probe.frame_on(body), jaw.frame_on(body)
     faces = isinstance(body, Layered) and is_flat(body, probe, frame) and is_flat(body, jaw, own)
     if not faces or any(abs(a + b) > 0 for a, b in zip(frame.axis, own.axis, strict=True)):
         raise PlaceError(
-            "must be on a plane face of a box or cylinder, with a parallel one opposite, for two jaws to close on both"
+            "must be on a plane face of a box or cylinder, with a parallel one opposite, for two jaws; "
+            'or on a body of triangles: shape = "surface" or "image"'
         )

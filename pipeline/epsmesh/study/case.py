@@ -122,17 +122,23 @@ class Case:
     @of_scene
     def expected(self) -> Probe:
         """The probe; if contact is found, as it is expected to end on a surface that is curved below it."""
-        probe = self.probe
-        if probe.is_flat:
-            return probe
-        bump = curvature_below(self.body, probe, self.frame)
-        return probe.on_bump(bump) if bump else probe
+        return self._expected(self.probe)
 
     @property
     @of_scene
     def jaw(self) -> Probe | None:
         """The second jaw, at its place; None without one."""
         return opposite(self.body, self.probe)
+
+    @property
+    @of_scene
+    def expected_jaw(self) -> Probe | None:
+        """The second jaw as its contact is expected to end, as that of the probe; None without one."""
+        return None if self.jaw is None else self._expected(self.jaw)
+
+    def _expected(self, tool: Probe) -> Probe:
+        bump = 0.0 if tool.is_flat else curvature_below(self.body, tool, tool.frame_on(self.body))
+        return tool.on_bump(bump) if bump else tool
 
     @property
     def features(self) -> frozenset[str]:

@@ -80,8 +80,11 @@ def _check_jaw(body: Body, probe: Probe, jaw: Probe) -> None:
         raise PlaceError(f"of the second jaw, {_footprint(jaw)} must be inside one face, not on or over its edge")
     check_opposite(body, probe)
     check_pull(body, probe)
-    if held_gap(body, jaw, frame) <= _TOUCHING * body.extent:
-        raise PlaceError(f"of the second jaw, {_footprint(jaw)} must not reach the support of the body")
+    try:
+        _check_contact(body, jaw, frame)
+    except PlaceError as error:
+        place = ", ".join(in_mm(x) for x in frame.point)
+        raise PlaceError(f"of the second jaw, where the axis leaves the body at [{place}]: {error}") from None
 
 
 def _footprint(probe: Probe) -> str:

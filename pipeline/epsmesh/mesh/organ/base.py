@@ -27,7 +27,7 @@ from epsmesh.shapes.surface import Surface
 from epsmesh.stages import stage
 
 # Increase by hand when the same file gives another surface.
-_VERSION = 6
+_VERSION = 7
 # Elements per contact radius near a contact, and the growth of their size beyond twice that radius.
 _PER_CONTACT, _GROWTH = 3, 0.3
 # Distance around a tangle within which the file's own facets stay, in units of these facets.
@@ -65,15 +65,17 @@ class Base:
 
 @dataclass(frozen=True)
 class Near:
-    """A contact at a ``point``, with several elements within its ``radius``; both in m."""
+    """Contacts, each at a point with several elements within a radius; both in m."""
 
-    point: Vector
-    radius: float
+    contacts: tuple[tuple[Vector, float], ...]
 
     def at(self, points: FloatArray) -> FloatArray:
         """Return the size (m) of elements at points (n, 3)."""
-        distance = np.linalg.norm(points - np.array(self.point), axis=1)
-        return np.asarray(self.radius / _PER_CONTACT + _GROWTH * np.maximum(distance - 2 * self.radius, 0.0))
+        size = np.full(len(points), np.inf)
+        for point, radius in self.contacts:
+            distance = np.linalg.norm(points - np.array(point), axis=1)
+            size = np.minimum(size, radius / _PER_CONTACT + _GROWTH * np.maximum(distance - 2 * radius, 0.0))
+        return size
 
 
 # Points, and numbers of points.

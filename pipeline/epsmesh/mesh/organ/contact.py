@@ -18,7 +18,7 @@ from epsmesh.mesh.model_arrays import corners_of, numbered_points
 from epsmesh.mesh.organ.borders import Bordered, are_within, borders_within, cut_at_rim, divided_to
 from epsmesh.mesh.organ.faces import Faces
 from epsmesh.mesh.organ.field import Field
-from epsmesh.mesh.organ.sheet import FIXED, FREE, PROBE, WALL, Sheet, compact, edges_of, groups_of
+from epsmesh.mesh.organ.sheet import FIXED, FREE, JAW, PROBE, WALL, Sheet, compact, edges_of, groups_of
 from epsmesh.mesh.reason import generate, reason
 from epsmesh.mesh.size import Sizes, set_size_field
 from epsmesh.shapes.complex import OUTSIDE
@@ -83,11 +83,13 @@ def _legs(outline: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
     return [(outline[k], outline[k + 1]) for k in range(len(outline) - 1)]
 
 
-def set_in(sheet: Sheet, faces: Faces, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift) -> Contact:
+def set_in(
+    sheet: Sheet, faces: Faces, frame: Frame, probe: Probe, sizes: Sizes, lift: Lift, kind: int = PROBE
+) -> Contact:
     """Return the sheet with the footprint's surroundings meshed to ``sizes``, and its edge as edges of the mesh.
 
     So are the borders of regions there. ``faces`` are the body's true ones. ``lift`` projects points (n, 2) of the
-    probe's plane along its axis onto them.
+    probe's plane along its axis onto them. ``kind`` is that of the footprint's facets.
 
     Raises:
         GeometryError: if a part of the footprint has no tissue below it, or a border of regions runs along its edge.
@@ -113,7 +115,9 @@ def set_in(sheet: Sheet, faces: Faces, frame: Frame, probe: Probe, sizes: Sizes,
         raise FoldedError(f"{_FOLDED}; for a rough surface, set `smooth` to the length of its bumps")
     if (sheet.kind[patch] == FIXED).any():
         raise GeometryError("the footprint is on, or next to, the fixed part of the body")
-    return _joined(bordered, _mesh_plane(bordered, loops, probe, sizes), lift, followed)
+    if np.isin(sheet.kind[patch], (PROBE, JAW)).any():
+        raise GeometryError("the surfaces around both jaws meet: use smaller jaws, or another place")
+    return _joined(bordered, _mesh_plane(bordered, loops, probe, sizes), lift, followed, kind)
 
 
 def _patch(sheet: Sheet, local: FloatArray, radius: float) -> IntArray:
@@ -245,7 +249,7 @@ def _closed(tags: list[int]) -> int:
     return int(geo.addCurveLoop(lines))
 
 
-def _joined(bordered: Bordered, plane: _Plane, lift: Lift, followed: FloatArray) -> Contact:
+def _joined(bordered: Bordered, plane: _Plane, lift: Lift, followed: FloatArray, kind: int) -> Contact:
     """Replace a patch of the sheet's surface by the lifted mesh of the plane."""
     sheet = bordered.sheet
     number = np.full(len(plane.points), -1, dtype=np.int64)
@@ -258,7 +262,7 @@ def _joined(bordered: Bordered, plane: _Plane, lift: Lift, followed: FloatArray)
     if not np.isfinite(points).all():
         raise GeometryError("a part of the surface around the footprint is hidden along the probe's axis")
     rest = np.setdiff1d(np.arange(len(sheet.facets)), bordered.patch)
-    group = groups_of(np.where(plane.inside, PROBE, FREE), _sides(bordered, plane))
+    group = groups_of(np.where(plane.inside, kind, FREE), _sides(bordered, plane))
     whole = Sheet(
         np.vstack([sheet.points, points]),
         np.vstack([sheet.facets[rest], number[plane.facets]]),

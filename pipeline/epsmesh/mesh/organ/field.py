@@ -1,5 +1,6 @@
 """Size field around a contact on a curved surface, from distances in space to its true or expected edge."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,7 +16,7 @@ from epsmesh.shapes.frame import Frame
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """``sizes`` around a ``frame``, and those of the body's regions.
+    """``sizes`` around a ``frame``, and those of the body's regions, or around a second jaw.
 
     ``edge`` (n, 3), in m, are dense points along the edge of contact, where it is expected to end if it is found.
     """
@@ -41,9 +42,14 @@ class Field:
 
         Points to which it refers are added to the model with its ``kernel``.
         """
-        terms = self.sizes.terms(self.frame.point, self._rim_text(1 / scale, kernel), 1 / scale)
-        set_background([*terms, *(term for part in self.local for term in part.terms(1 / scale, kernel))])
+        set_background(self.terms(1 / scale, kernel))
         kernel.synchronize()
+
+    def terms(self, unit: float, kernel: Any) -> Iterator[str]:
+        """Yield limits of the size, whose minimum counts, as text for gmsh: see :class:`.LocalSizes`."""
+        yield from self.sizes.terms(self.frame.point, self._rim_text(unit, kernel), unit)
+        for part in self.local:
+            yield from part.terms(unit, kernel)
 
     def _to_rim(self, points: FloatArray) -> FloatArray:
         """Return distances (m) to the expected edge of contact."""

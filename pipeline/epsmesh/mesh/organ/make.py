@@ -1,7 +1,8 @@
 """Mesh of a scene on a body of triangles: coarse surface, contact, surface by the size field, volume, groups."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -10,19 +11,20 @@ from scipy.spatial import cKDTree
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.mesh.generate import GeometryError, MeshArrays, MeshError
 from epsmesh.mesh.organ.base import Base, Kept, Near, far_surface, put_back
-from epsmesh.mesh.organ.contact import Contact, FoldedError, set_in
+from epsmesh.mesh.organ.contact import FoldedError, Lift, set_in
 from epsmesh.mesh.organ.faces import Faces
 from epsmesh.mesh.organ.field import Field
 from epsmesh.mesh.organ.regions import fill_regions
 from epsmesh.mesh.organ.relax import relaxed
 from epsmesh.mesh.organ.remesh import remesh
-from epsmesh.mesh.organ.sheet import PROBE, Sheet, TangledError, edges_of, group_names
+from epsmesh.mesh.organ.sheet import Sheet, TangledError, edges_of, group_names
 from epsmesh.mesh.organ.untangle import untangled
 from epsmesh.mesh.regions import embedded_sizes
 from epsmesh.mesh.size import Sizes
-from epsmesh.scene.model import FREE, Scene
+from epsmesh.scene.model import FREE, PROBE, Scene
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.complex import Complex
+from epsmesh.shapes.frame import Frame
 from epsmesh.shapes.scanned import FINE, Scanned
 
 # Passes of surface meshing: only in the second pass points are dense where sizes change fast.
@@ -45,8 +47,6 @@ _AT_JUNCTION = 4.0
 MOST_EXCESS, _OF_CHORDS = 0.03, 0.3
 # The same of a region, which is smaller and rounder.
 MOST_OF_REGION = 0.1
-
-Lift = Callable[[FloatArray], FloatArray]
 
 
 def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = None) -> MeshArrays:
@@ -73,7 +73,7 @@ def mesh_scanned(scene: Scene, body: Scanned, sizes: Sizes, kept: Kept | None = 
             except FoldedError:
                 if contact is not None:
                     raise
-                contact = Near(scene.frame.point, scene.footprint.circumradius)
+                contact = Near(tuple((scene.frame_of(n).point, tool.circumradius) for n, tool in scene.tools.items()))
             except GeometryError:
                 raise
             except MeshError as error:
@@ -96,21 +96,17 @@ def mesh_organ(scene: Scene, sizes: Sizes, far: Base) -> MeshArrays:
     start = perf_counter()
     _check(scene)
 
-    def lift(points: FloatArray) -> FloatArray:
-        return scene.body.lift(scene.frame, points)[0]
-
-    contact = set_in(far.sheet, far.faces, scene.frame, scene.footprint, sizes, lift)
-    around = scene.probe.far_sizes(scene.frame, sizes.growth, sizes.coarseness)
-    field = Field(sizes, scene.frame, contact.edge, embedded_sizes(scene.body, around))
-    sheet = _to_sizes(contact, field, _Truth(scene, far, lift))
-    sheet = untangled(sheet, np.unique(sheet.facets[sheet.kind == PROBE]))
+    sheet, field, patches = _in_contact(scene, sizes, far)
+    sheet = _to_sizes(sheet, field, _Truth(far, patches))
+    kinds = [patch.kind for patch in patches]
+    sheet = untangled(sheet, np.unique(sheet.facets[np.isin(sheet.kind, kinds)]))
     _check_whole(sheet, far, scene.body)
     deviation = _deviation(sheet, far.faces, field)
     parts = Complex(sheet.points, sheet.facets, sheet.sides)
     filled = fill_regions(parts, scene.body, field)
     facets = {name: sheet.facets[sheet.kind == number] for number, name in group_names().items()}
     facets[FREE] = np.vstack([facets[FREE], filled.walls])
-    rim = np.unique(sheet.border(PROBE))
+    rim = np.unique(np.vstack([sheet.border(kind) for kind in kinds]))
     points = relaxed(filled, sheet, far.faces.skin)
     seconds = perf_counter() - start
     return MeshArrays(points, filled.cells, facets, rim, seconds, filled.regions, deviation=deviation)
@@ -164,40 +160,88 @@ def _deviation(sheet: Sheet, faces: Faces, field: Field) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Truth:
-    """Projection onto the true surface: points of the footprint are lifted, others move to the nearest point."""
+class _Patch:
+    """The surface below a tool: facets of a ``kind`` within points of its true ``rim`` (k, 3), m, in order.
 
-    scene: Scene
-    far: Base
+    ``lift`` projects points of the plane of its ``frame`` along its axis onto the true surface.
+    """
+
+    kind: int
+    frame: Frame
     lift: Lift
+    rim: FloatArray
 
-    def put_back(self, sheet: Sheet, rim: IntArray, true_rim: FloatArray) -> Sheet:
-        """Return the sheet on the true surface; its ``rim`` points (k) move to ``true_rim`` (k, 3)."""
-        points = sheet.points.copy()
+    def rim_of(self, sheet: Sheet) -> IntArray:
+        """Return the points (k) of a sheet that are its rim.
+
+        Raises:
+            MeshError: if the sheet has other ones.
+        """
+        found = np.unique(sheet.border(self.kind))
+        distance, nearest = cKDTree(sheet.points[found]).query(self.rim)
+        rim = found[nearest]
+        extent = float(np.ptp(sheet.points, axis=0).max())
+        if not len(found) == len(self.rim) == len(np.unique(rim)) or distance.max() > _SAME * extent:
+            raise MeshError("the remesher of surfaces changed the footprint's edge")
+        return rim
+
+
+def _in_contact(scene: Scene, sizes: Sizes, far: Base) -> tuple[Sheet, Field, list[_Patch]]:
+    """Return the surface with the footprints of all tools in it, the size field, and the patches below the tools."""
+    numbers = {name: kind for kind, name in group_names().items()}
+    sheet, fields, patches = far.sheet, list[Field](), list[_Patch]()
+    for name, tool in scene.tools.items():
+        is_first, frame = name == PROBE, scene.frame_of(name)
+        footprint, own = (scene.footprint, sizes) if is_first else (tool, sizes.of_jaw)
+        lift = partial(_lifted, scene.body, frame)
+        contact = set_in(sheet, far.faces, frame, footprint, own, lift, numbers[name])
+        sheet = contact.sheet
+        patches.append(_Patch(numbers[name], frame, lift, sheet.points[contact.rim]))
+        around = tool.far_sizes(frame, sizes.growth, sizes.coarseness)
+        fields.append(Field(own, frame, contact.edge, embedded_sizes(scene.body, around)))
+    first, *others = fields
+    return sheet, replace(first, local=(*others, *first.local)), patches
+
+
+def _lifted(body: Body, frame: Frame, points: FloatArray) -> FloatArray:
+    return body.lift(frame, points)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Truth:
+    """Projection onto the true surface: points below tools are lifted, others move to the nearest point."""
+
+    far: Base
+    patches: Sequence[_Patch]
+
+    def put_back(self, sheet: Sheet, rims: Sequence[IntArray]) -> Sheet:
+        """Return the sheet on the true surface; its ``rims``, points (k), move to those of the patches."""
+        points, rim, true_rim = sheet.points.copy(), np.concatenate(rims), np.vstack([p.rim for p in self.patches])
         points[rim] = true_rim
         on_border = np.concatenate([rim, sheet.junctions.ravel()])
-        inner = np.setdiff1d(np.unique(sheet.facets[sheet.kind == PROBE]), on_border)
-        lifted = self.lift(self.scene.frame.local(points[inner])[:, :2])
-        seen = np.isfinite(lifted).all(axis=1)
-        own = np.setdiff1d(self.far.own_points(sheet), np.concatenate([rim, inner]))
-        known = np.concatenate([rim, inner[seen], own])
-        places = np.vstack([true_rim, lifted[seen], points[own]])
-        return put_back(Sheet(points, sheet.facets, sheet.group, sheet.sharp), self.far.faces, known, places)
+        known, places, below = [rim], [true_rim], [rim]
+        for patch in self.patches:
+            inner = np.setdiff1d(np.unique(sheet.facets[sheet.kind == patch.kind]), on_border)
+            lifted = patch.lift(patch.frame.local(points[inner])[:, :2])
+            seen = np.isfinite(lifted).all(axis=1)
+            known.append(inner[seen])
+            places.append(lifted[seen])
+            below.append(inner)
+        own = np.setdiff1d(self.far.own_points(sheet), np.concatenate(below))
+        known.append(own)
+        places.append(points[own])
+        moved = Sheet(points, sheet.facets, sheet.group, sheet.sharp)
+        return put_back(moved, self.far.faces, np.concatenate(known), np.vstack(places))
 
 
-def _to_sizes(contact: Contact, field: Field, truth: _Truth) -> Sheet:
-    """Remesh the surface to the size field; points are on the true surface, the footprint's edge is unchanged."""
-    sheet, rim = contact.sheet, contact.rim
-    true_rim, extent = sheet.points[rim], float(np.ptp(sheet.points, axis=0).max())
+def _to_sizes(sheet: Sheet, field: Field, truth: _Truth) -> Sheet:
+    """Remesh the surface to the size field; points are on the true surface, the footprints' edges are unchanged."""
+    extent = float(np.ptp(sheet.points, axis=0).max())
     for _ in range(_PASSES):
-        kept = np.column_stack([rim, np.roll(rim, -1)])
+        rims = [patch.rim_of(sheet) for patch in truth.patches]
+        kept = np.vstack([np.column_stack([rim, np.roll(rim, -1)]) for rim in rims])
         size = field.at(sheet.points)
         as_is = truth.far.is_own(sheet) & (sheet.extents < _TOO_LARGE * size[sheet.facets].min(axis=1))
         sheet = remesh(sheet, size, truth.far.deviation * min(field.sizes.largest, extent), kept, as_is)
-        found = np.unique(sheet.border(PROBE))
-        distance, nearest = cKDTree(sheet.points[found]).query(true_rim)
-        rim = found[nearest]
-        if not len(found) == len(true_rim) == len(np.unique(rim)) or distance.max() > _SAME * extent:
-            raise MeshError("the remesher of surfaces changed the footprint's edge")
-        sheet = truth.put_back(sheet, rim, true_rim)
+        sheet = truth.put_back(sheet, [patch.rim_of(sheet) for patch in truth.patches])
     return sheet

@@ -16,8 +16,8 @@ from epsmesh.shapes.triangles import closed_edges, doubled_normals, edge_keys, e
 
 # Kinds of facets, of the body's surface and inside the body. A group has one kind, and the same regions on both sides:
 # their numbers are added in multiples of these. The remesher keeps the groups apart.
-WALL, FREE, FIXED, PROBE = 0, 1, 2, 3
-_KINDS, _REGIONS = 4, 1024
+WALL, FREE, FIXED, PROBE, JAW = 0, 1, 2, 3, 4
+_KINDS, _REGIONS = 5, 1024
 
 
 class TangledError(MeshError):
@@ -36,7 +36,7 @@ class TangledError(MeshError):
 
 def group_names() -> dict[int, str]:
     """Return the groups' names in meshes."""
-    return {FREE: model.FREE, FIXED: model.FIXED, PROBE: model.PROBE}
+    return {FREE: model.FREE, FIXED: model.FIXED, PROBE: model.PROBE, JAW: model.JAW}
 
 
 def groups_of(kind: IntArray, sides: IntArray) -> IntArray:

@@ -6,13 +6,29 @@ loop: the tool's nodes have the tool's distance, those above a bed have the bed'
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import inf
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
-from epsmesh.shapes.distance import Distance
+from epsmesh.shapes.distance import Distance, heights_along
 from epsmesh.shapes.ground import Ground
+
+# Depths of which gaps are kept: friction goes from one to the next, and asks for both.
+_DEPTHS = 4
+
+
+def above_places(
+    distance: Callable[[FloatArray, float], Distance], normal: FloatArray, places: FloatArray
+) -> Callable[[FloatArray, float], Distance]:
+    """Return the distance of linear elasticity: along a unit ``normal`` of the surface, above ``places`` (n, 3)."""
+
+    @lru_cache(_DEPTHS)
+    def heights(depth: float) -> FloatArray:
+        return heights_along(normal, lambda points: distance(points, depth), places)
+
+    return lambda points, depth: Distance.along(normal, heights(depth), points - places)
 
 
 @dataclass(frozen=True)
@@ -26,7 +42,8 @@ class Bed:
 
     It is a support, or a jaw that has an edge: ``ends_at`` is a mask of points (n, 3) on the edge of its candidates,
     true where it ends itself. A jaw advances along its normal by ``pace`` times the tool's depth; ``foot`` (m) is on
-    its axis, and ``is_sharp`` says that it ends at a sharp edge. ``is_tissue``: it is the tissue below a loose layer,
+    its axis, and ``is_sharp`` says that it ends at a sharp edge. ``touched`` is the outward unit normal of the surface
+    where a jaw first touches it, if that is inclined to its axis. ``is_tissue``: it is the tissue below a loose layer,
     whose displacements are those relative to it.
     """
 
@@ -41,6 +58,7 @@ class Bed:
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_tissue: bool = False
     is_sharp: bool = False
+    touched: tuple[float, float, float] | None = None
 
     @property
     def is_support(self) -> bool:
@@ -58,7 +76,12 @@ class Bed:
         return self.pace * np.array(self.normal)
 
     def at_rest(self, places: FloatArray) -> "Bed":
-        """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along its axis."""
+        """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along its axis.
+
+        Of a jaw that is inclined to the surface, they are along the surface's normal.
+        """
+        if self.touched is not None:
+            return replace(self, distance=above_places(self.distance, np.array(self.touched), places))
         heights, outward = self.height(places), -np.array(self.normal)
         return replace(
             self,
@@ -83,12 +106,20 @@ class Bed:
         )
 
     def advanced(self, change: float) -> "Bed":
-        """Return the bed where the tool is farther by ``change`` (m)."""
-        return replace(
-            self,
-            distance=lambda points, depth: self.distance(points, depth + change),
-            height=lambda points: self.height(points) - self.pace * change,
-        )
+        """Return the bed where the tool is farther by ``change`` (m), as :meth:`.Tool.advanced` does."""
+        if self.touched is None:
+            return replace(
+                self,
+                distance=lambda points, depth: self.distance(points, depth + change),
+                height=lambda points: self.height(points) - self.pace * change,
+            )
+        nearer = -change * float(self.advance @ np.array(self.touched))
+
+        def distance(points: FloatArray, depth: float) -> Distance:
+            found = self.distance(points, depth)
+            return replace(found, gap=found.gap - nearer)
+
+        return replace(self, distance=distance)
 
 
 def support_of(ground: Ground, friction: float) -> Bed:

@@ -2,17 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance, heights_along
 from epsmesh.shapes.frame import Vector
-from epsmesh.solve.contact.bed import Bed
-
-# Depths of which gaps are kept: friction goes from one to the next, and asks for both.
-_DEPTHS = 4
+from epsmesh.solve.contact.bed import Bed, above_places
 
 
 def _no_distance(points: FloatArray, depth: float) -> Distance:
@@ -63,21 +59,11 @@ class Tool:
         They are along the surface's normal at the first touch: −z, but for a tool that is inclined to the surface.
         """
         if self.normal is not None:
-            return self._along(np.array(self.normal), places)
+            return replace(self, distance=above_places(self.distance, np.array(self.normal), places))
         heights = self.height(places) - self.first
 
         def distance(points: FloatArray, depth: float) -> Distance:
             return Distance.along_axis(heights - depth, points - places)
-
-        return replace(self, distance=distance)
-
-    def _along(self, normal: FloatArray, places: FloatArray) -> "Tool":
-        @lru_cache(_DEPTHS)
-        def heights(depth: float) -> FloatArray:
-            return self.heights_along(normal, places, depth)
-
-        def distance(points: FloatArray, depth: float) -> Distance:
-            return Distance.along(normal, heights(depth), points - places)
 
         return replace(self, distance=distance)
 

@@ -9,10 +9,11 @@ from functools import partial
 from math import inf, isfinite
 from typing import Any, Protocol
 
-from epsmesh.shapes.body import Body, Layered
+from epsmesh.shapes.body import Body, Drawn, Layered
 from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.contact import is_flat, is_inclined, is_level
 from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.grasp import opposite
 from epsmesh.shapes.insertion import Inserted
 from epsmesh.shapes.probe import STICK, Probe
 from epsmesh.shapes.registry import TERMS
@@ -99,6 +100,11 @@ def touches_inclined(scene: Scene) -> bool:
     if not scene.probe.is_unilateral or _is_large(scene):
         return False
     return is_inclined(scene.body, scene.probe, scene.probe.frame_on(scene.body))
+
+
+def _jaw_touches_inclined(scene: Scene) -> bool:
+    jaw = opposite(scene.body, scene.probe)
+    return jaw is not None and not _is_large(scene) and is_inclined(scene.body, jaw, jaw.frame_on(scene.body))
 
 
 def _is_level(scene: Scene) -> bool:
@@ -255,6 +261,7 @@ FEATURES: dict[str, Feature] = {
     "layers": Feature("body.layer", lambda s: isinstance(s.body, Layered) and bool(s.body.layer)),
     "inclusion": Feature("body.inclusion", lambda s: bool(s.body.inclusion)),
     "region": Feature("body.region", lambda s: "region" in s.body.pieces),
+    "region of a drawn body": Feature("body.region", lambda s: "region" in s.body.pieces and isinstance(s.body, Drawn)),
     "curved body": Feature("body.shape", lambda s: not isinstance(s.body, Layered)),
     "large displacements": Feature("material.law", _is_large, ("body",)),
     "relaxation": Feature("material.relaxation", lambda s: any(_relaxations(s)), ("body",)),
@@ -289,6 +296,7 @@ FEATURES: dict[str, Feature] = {
     "friction": Feature("probe.friction", lambda s: s.probe.friction > 0, write=_coefficient),
     "friction that slides": Feature("probe.friction", lambda s: 0 < s.probe.friction < inf, write=_coefficient),
     "inclined touch of a linear law": Feature("probe.axis", touches_inclined, ("body", "material"), list),
+    "inclined touch of a second jaw": Feature("probe.axis", _jaw_touches_inclined, ("body", "material"), list),
     "given force": Feature("probe.force", lambda s: s.probe.force is not None, write=lambda force: f"{force:.6g} N"),
     "history": Feature("probe.history", lambda s: s.probe.history is not None),
     "slice": Feature("probe.slice", lambda s: getattr(s.probe, "slice", 0.0) != 0, write=in_mm),

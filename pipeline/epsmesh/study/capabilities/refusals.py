@@ -335,9 +335,22 @@ REFUSALS: tuple[Refusal, ...] = (
         'would move the whole body without force: give body.fixed, such as "sides"',
     ),
     Refusal("pull", "accuracy", "has bars of its steps, which finer meshes keep: give sizes"),
+    *(
+        Refusal(
+            "pull",
+            inclined,
+            "is across the axis, to which the surface is inclined: jaws would move in or out of the tissue, and gaps "
+            "of a linear law stay. Use a law of large displacements, or an axis at right angles to the surface",
+        )
+        for inclined in ("inclined touch of a linear law", "inclined touch of a second jaw")
+    ),
     Refusal("support that lets go", "grasp", "is not computed with two jaws: give body.fixed, or omit `together`"),
     Refusal("loads", "grasp", f"would move the body before both jaws touch it: {_NO_LOADS}, or omit `together`"),
-    Refusal("region", "grasp", "is meshed from triangles, without a second jaw: use an inclusion, or omit `together`"),
+    Refusal(
+        "region of a drawn body",
+        "grasp",
+        "is meshed from triangles, on which drawn bodies have no second jaw: use an inclusion, or omit `together`",
+    ),
     Refusal("capsule on the surface", "grasp", _GRASPED),
     Refusal("tension of the capsule", "grasp", _GRASPED),
     Refusal("range of depths", "grasp", "its depths have meshes of their own in a grasp: omit it"),
