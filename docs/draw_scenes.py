@@ -35,6 +35,7 @@ ORDER = (
     "image",
     "support",
     "grasp",
+    "organ-grasp",
 )
 # Bytes of a picture.
 MOST = 150_000

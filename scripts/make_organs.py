@@ -127,9 +127,26 @@ def hepatic_vein(places: FloatArray) -> FloatArray:
     return vessel(places, ((10.0, 14.0, 9.0, 5.0), knee), (knee, (-48.0, -22.0, 8.0, 4.0)))
 
 
+def upper(places: FloatArray) -> FloatArray:
+    """Like the thin edge of a liver, upright."""
+    return ellipsoid((-5, 0, 4), (8, 21, 24))(places) + 0.3 * noise(places, 18, 6)
+
+
+def beside(places: FloatArray) -> FloatArray:
+    """Like a part of a stomach that lies against it, and ends below its upper edge."""
+    return ellipsoid((7, 1, -7), (9, 19, 15))(places) + 0.3 * noise(places, 18, 7)
+
+
+def of_stomach(places: FloatArray) -> FloatArray:
+    """The part of both that is nearer to the stomach's middle than to the liver's surface."""
+    return np.maximum(beside(places), beside(places) - upper(places))
+
+
 # Regions of the patient's liver, with labels from 2.
 PATIENT: dict[str, Field] = {"tumour": lump, "portal vein": portal_vein, "hepatic vein": hepatic_vein}
 
+# Two organs that touch.
+TOUCHING = Organ(lambda places: np.minimum(upper(places), beside(places)), (17, 24, 31), 1.5, 0)
 ORGANS = {
     "liver.stl": Organ(liver, (100, 60, 50), 2.0, 5000),
     "kidney.obj": Organ(kidney, (62, 38, 32), 1.25, 3000),
@@ -184,18 +201,18 @@ def ply(points: FloatArray, facets: IntArray) -> bytes:
 WRITERS = {".stl": stl, ".obj": obj, ".ply": ply}
 
 
-def image(*inside: Field) -> bytes:
-    """The liver, with other bodies in it, as a NIfTI label map."""
-    labels = label_map(ORGANS["liver.stl"], *inside)
+def image(*inside: Field, organ: Organ = ORGANS["liver.stl"]) -> bytes:
+    """The liver, or another ``organ``, with other bodies in it, as a NIfTI label map."""
+    labels = label_map(organ, *inside)
     found = nibabel.Nifti1Image(labels.values, np.vstack([labels.affine * 1e3, [0, 0, 0, 1]]))
     found.header.set_xyzt_units("mm")
     return gzip.compress(found.to_bytes(), mtime=0)
 
 
-def names() -> bytes:
-    """The names of the patient's labels, as ITK-SNAP writes them."""
-    lines = [f'{label} 0 0 0 1 1 1 "{name}"' for label, name in enumerate(("liver", *PATIENT), start=1)]
-    return "\n".join(["# Labels of patient.nii.gz; made by scripts/make_organs.py", *lines, ""]).encode()
+def names(file: str, *labels: str) -> bytes:
+    """The names of an image's labels, from 1, as ITK-SNAP writes them."""
+    lines = [f'{label} 0 0 0 1 1 1 "{name}"' for label, name in enumerate(labels, start=1)]
+    return "\n".join([f"# Labels of {file}; made by scripts/make_organs.py", *lines, ""]).encode()
 
 
 def stiffness() -> bytes:
@@ -215,7 +232,9 @@ FILES: dict[str, Callable[[], bytes]] = {
     **{name: lambda name=name: WRITERS[Path(name).suffix](*surface(ORGANS[name])) for name in ORGANS},
     "liver.nii.gz": lambda: image(tumour),
     "patient.nii.gz": lambda: image(*PATIENT.values()),
-    "patient.txt": names,
+    "patient.txt": lambda: names("patient.nii.gz", "liver", *PATIENT),
+    "organs.nii.gz": lambda: image(of_stomach, organ=TOUCHING),
+    "organs.txt": lambda: names("organs.nii.gz", "liver", "stomach"),
     "stiffness.nii.gz": stiffness,
 }
 

@@ -273,6 +273,8 @@ def _grasp(study: Study) -> None:
     """Let an equal jaw close on the body from the opposite side; its sides hold it, or nothing else."""
     is_round = study["body"]["shape"] in ("box", "cylinder")
     study["body"]["fixed"] = "sides" if is_round else study["body"].get("fixed", "none")
+    if study["body"]["shape"] in ("surface", "image"):  # held below: jaws close from the sides, across a border if any
+        study["probe"].setdefault("at", ["20 mm", "0 mm", "-8 mm"])
     study["probe"].setdefault("contact", "unilateral")
     study["probe"] = [study["probe"] | {"together": "grasp"}, {"together": "grasp"}]
 

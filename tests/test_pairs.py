@@ -45,7 +45,7 @@ _OF_SCHEMA = (
     "is not computed where two jaws close",
     "of the second jaw",
     "does not press the body on [body.support]",
-    "for two jaws to close on both",
+    "with a parallel one opposite, for two jaws",
     "a tool that is inserted",
     "excludes [probe.insertion]",
     "would touch the body",

@@ -89,8 +89,8 @@ def rungs_for(case: Case, accuracy: float) -> tuple[Rung, ...]:
     rungs: dict[Mesh, Rung] = {}
     for number in tried:  # several recipes give one mesh where the study gives the rest
         mesh = _mesh(case, ladder[number])
-        if case.jaw is not None:
-            mesh = _with_jaw(case, case.jaw, mesh, ladder[number])
+        if case.expected_jaw is not None:
+            mesh = _with_jaw(case, case.expected_jaw, mesh, ladder[number])
         rung = Rung(mesh.with_far_regions(_coarseness(case, mesh, expected[number])), expected[number])
         rungs.setdefault(rung.mesh, rung)
     return tuple(rungs.values())
