@@ -157,7 +157,8 @@ def test_the_label_map_has_two_organs_that_touch():
     ("content", "said"),
     [
         (grasp(BALL | ACROSS | {"at": ["-5 mm", "0 mm", "28 mm"], "axis": None}, body=touching()), "second jaw"),
-        (grasp(DISC | SIDE | {"at": ["-14 mm", "0 mm", "-9 mm"]}, body=touching()), "must not reach the support"),
+        (grasp(BALL | ACROSS | {"at": ["-14 mm", "0 mm", "-10 mm"]}, {"radius": "8 mm"}, body=touching()), "the second jaw's edge"),
+        (grasp(BALL | ACROSS | {"at": ["-14 mm", "0 mm", "-10 mm"]}, {"radius": "14 mm"}, body=touching()), "must not reach the support"),
         (grasp(BALL | ABOVE, {"radius": "60 mm"}, body=touching()), "of the second jaw, where the axis leaves the"),
         (
             grasp(BALL | ACROSS | {"friction": 0.3, "pull": "0.1 mm", "pull_direction": [0, 0, 1]}, body=touching()),

@@ -6,6 +6,7 @@ from math import inf, isfinite, isinf
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import is_level
 from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.grasp import opposite
 from epsmesh.shapes.probe import ON_EDGE, Probe
 from epsmesh.shapes.section import in_mm
 from epsmesh.study.axis import Axis
@@ -112,7 +113,7 @@ def check_column(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> No
 
 
 def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
-    """Report a gap between the probe and a fixed face that has no room for an element."""
+    """Report a gap between the probe, or a second jaw, and a fixed face that has no room for an element."""
     if _meets_held_column(body, probe, mesh):
         problems.error(
             "mesh.epsilon",
@@ -123,15 +124,16 @@ def check_gap(body: Body, probe: Probe, mesh: Mesh, problems: Problems) -> None:
         return
     if mesh.accuracy is not None and "rim" not in mesh.model_fields_set:
         return
-    for key, gap in held_gaps(body, probe, mesh).items():
-        if gap < mesh.rim_size(probe.half_width):
-            problems.error(
-                key,
-                in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
-                f"leaves {in_mm(gap)} between the tool's edge and a fixed face, less than one element. Use a "
-                "`rim` below "
-                f"{in_mm(gap)}",
-            )
+    tools = {"tool": probe} | ({} if (jaw := opposite(body, probe)) is None else {"second jaw": jaw})
+    for name, tool in tools.items():
+        for key, gap in held_gaps(body, tool, mesh).items():
+            if gap < mesh.rim_size(tool.half_width):
+                problems.error(
+                    key,
+                    in_mm(mesh.epsilon) if key == "mesh.epsilon" else None,
+                    f"leaves {in_mm(gap)} between the {name}'s edge and a fixed face, less than one element. Use a "
+                    f"`rim` below {in_mm(gap)}",
+                )
 
 
 def _meets_held_column(body: Body, probe: Probe, mesh: Mesh) -> bool:
