@@ -24,6 +24,8 @@ HELD = {"below": "-35 mm"}
 ACROSS, ABOVE = (
     {"at": ["-14 mm", "0 mm", f"{z} mm"], "axis": [1, 0, 0], "depth": "0.4 mm", "radius": "4 mm"} for z in (-2, 14)
 )
+# So low that the second jaw is next to the support.
+LOW = {"at": ["-14 mm", "0 mm", "-10 mm"]}
 SIZES = {"rim": "0.4 mm", "growth": 0.8, "fine": "6 mm"}
 
 
@@ -157,8 +159,8 @@ def test_the_label_map_has_two_organs_that_touch():
     ("content", "said"),
     [
         (grasp(BALL | ACROSS | {"at": ["-5 mm", "0 mm", "28 mm"], "axis": None}, body=touching()), "second jaw"),
-        (grasp(BALL | ACROSS | {"at": ["-14 mm", "0 mm", "-10 mm"]}, {"radius": "8 mm"}, body=touching()), "the second jaw's edge"),
-        (grasp(BALL | ACROSS | {"at": ["-14 mm", "0 mm", "-10 mm"]}, {"radius": "14 mm"}, body=touching()), "must not reach the support"),
+        (grasp(BALL | ACROSS | LOW, {"radius": "8 mm"}, body=touching()), "the second jaw's edge"),
+        (grasp(BALL | ACROSS | LOW, {"radius": "14 mm"}, body=touching()), "must not reach the support"),
         (grasp(BALL | ABOVE, {"radius": "60 mm"}, body=touching()), "of the second jaw, where the axis leaves the"),
         (
             grasp(BALL | ACROSS | {"friction": 0.3, "pull": "0.1 mm", "pull_direction": [0, 0, 1]}, body=touching()),
