@@ -71,16 +71,21 @@ def test_on_stiff_tissue_a_layer_lies_as_on_a_rigid_support(friction):
 
 
 def test_friction_of_the_layer_is_between_none_and_sticking():
-    smooth, some, most, stuck, bonded = (
-        one(body=flap(friction), mesh=ROUGH) for friction in (0, 0.1, 2.0, "stick", None)
-    )
-    assert smooth.force < some.force < most.force < bonded.force
-    assert most.force == pytest.approx(stuck.force, rel=3e-4)
-    assert max(each.balance for each in (smooth, some, most, stuck)) < 1e-8
-    for each in (smooth, some, most, stuck):
+    smooth, some, stuck, bonded = (one(body=flap(friction), mesh=ROUGH) for friction in (0, 0.1, "stick", None))
+    assert smooth.force < some.force < stuck.force < bonded.force
+    assert max(each.balance for each in (smooth, some, stuck)) < 1e-8
+    for each in (smooth, some, stuck):
         assert each.largest["interface_force"] == pytest.approx(each.force, rel=1e-8)
-    lifted = [each.largest["lift_off_area"] for each in (smooth, some, most)]
+    lifted = [each.largest["lift_off_area"] for each in (smooth, some, stuck)]
     assert lifted == sorted(lifted, reverse=True)
+
+
+@pytest.mark.nightly
+def test_much_friction_of_the_layer_is_sticking():
+    most, stuck = (one(body=flap(friction)) for friction in (2.0, "stick"))
+    assert most.balance < 1e-8
+    assert most.force == pytest.approx(stuck.force, rel=3e-4)
+    assert most.largest["lift_off_area"] == pytest.approx(stuck.largest["lift_off_area"], abs=1e-2 * 40e-3**2)
 
 
 def test_beside_the_middle_a_layer_that_sticks_is_pressed():
@@ -90,7 +95,7 @@ def test_beside_the_middle_a_layer_that_sticks_is_pressed():
 
 
 def test_the_bars_cover_a_finer_mesh():
-    coarse, fine = (one(body=flap(), mesh={"fine": f, "rim": r}) for f, r in (("5 mm", "1 mm"), ("1.5 mm", "0.25 mm")))
+    coarse, fine = (one(body=flap(), mesh={"fine": f, "rim": r}) for f, r in (("5 mm", "1 mm"), ("2.5 mm", "0.4 mm")))
     assert abs(coarse.force - fine.force) < coarse.force * coarse.force_error + fine.force * fine.force_error
     for name in ("interface_force", "lift_off_area"):
         bars = sum(each.largest[f"{name}_error"] for each in (coarse, fine))
@@ -108,9 +113,10 @@ def test_the_work_of_the_tool_is_the_energy():
     assert work == pytest.approx(found[-1].energy, rel=0.01)
 
 
-def test_a_factorisation_finds_what_iterations_find():
+@pytest.mark.parametrize("friction", [0, pytest.param(0.2, marks=pytest.mark.nightly)])
+def test_a_factorisation_finds_what_iterations_find(friction):
     iterated, factorised = (
-        one(body=flap(0.2), solve={"method": method}, mesh=ROUGH) for method in ("iterative", "direct")
+        one(body=flap(friction), solve={"method": method}, mesh=ROUGH) for method in ("iterative", "direct")
     )
     assert factorised.force == pytest.approx(iterated.force, rel=1e-7)
 
