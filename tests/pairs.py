@@ -269,6 +269,21 @@ def _loose(study: Study) -> None:
     study["probe"].setdefault("contact", "unilateral")
 
 
+def _loose_region(study: Study) -> None:
+    """Let a ball lie loose within the body."""
+    middle = 10 if study["body"]["shape"] == "ellipsoid" else -9
+    lump = {
+        "name": "lump",
+        "at": ["-7 mm", "7 mm", f"{middle} mm"],
+        "radius": "3 mm",
+        "young": "20 kPa",
+        "poisson": 0.3,
+    }
+    lump |= {"density": "1060 kg/m^3", "contact": "unilateral", "friction": "stick"}
+    study["body"].setdefault("inclusion", []).append(lump)
+    study["probe"].setdefault("contact", "unilateral")
+
+
 def _grasp(study: Study) -> None:
     """Let an equal jaw close on the body from the opposite side; its sides hold it, or nothing else."""
     is_round = study["body"]["shape"] in ("box", "cylinder")
@@ -342,6 +357,7 @@ FEATURES = (
     Feature("friction", "contact", _update("probe", contact="unilateral", friction=0.3)),
     Feature("support that lets go", "support", _support),
     Feature("loose layer", "support", _loose),
+    Feature("loose region", "support", _loose_region),
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from epsmesh.mesh.curve import curve
 from epsmesh.mesh.elliptic_meridian import EllipticMeridian
 from epsmesh.mesh.generate import MeshArrays, MeshError, generate
-from epsmesh.mesh.loose import part_layer
+from epsmesh.mesh.loose import part_loose
 from epsmesh.mesh.meridian import Meridian
 from epsmesh.mesh.parts import Part, refine, reflect_part, split, whole
 from epsmesh.mesh.refine import refined
@@ -64,8 +64,8 @@ def unrefined_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" =
             raise type(error)(f"{error}. {thin}") from error
         raise
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
-    arrays = part_layer(arrays, case.body) if case.body.loose else arrays
     arrays = arrays if scene.straight else curve(arrays, scene)
+    arrays = part_loose(arrays, loose) if (loose := case.body.loose) else arrays
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
     found = _named(reflect(arrays, _beyond(case, mirrors), _middle(case)), case)
     return replace(found, seconds=perf_counter() - start)

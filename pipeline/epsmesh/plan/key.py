@@ -14,7 +14,7 @@ from epsmesh.shapes.capsule import Capsule
 from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.part import Around
 from epsmesh.shapes.probe import Probe
-from epsmesh.shapes.regions import Layer, Region
+from epsmesh.shapes.regions import Region
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section
 from epsmesh.shapes.tissue import Tissue
@@ -146,7 +146,7 @@ def operator_key(case: Case) -> str:
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
-    rests += [f"loose {loose}"] if (loose := case.body.loose) else []
+    rests += [f"loose {loose.parts} {loose.friction}"] if (loose := case.body.loose) else []
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     rests += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
@@ -223,7 +223,7 @@ def _body_text(body: Body, stress: float | None = None) -> str:
 def _not_of_shape(region: Region, stress: float | None) -> tuple[str, ...]:
     """Return the keys of a region that its text has elsewhere, or has no use for."""
     keys = *Tissue.model_fields, "toughness"
-    if not isinstance(region, Layer) or region.contact == "bonded":
+    if region.contact == "bonded":
         return *keys, "contact", "friction"
     return keys if stress is not None else (*keys, "friction")
 

@@ -60,7 +60,7 @@ _OF_SHAPE = ("unloading", "round_trip")
 _OF_REST = tuple(
     f"{name}{bar}" for name in ("support_force", "lift_off_area", "support_slip") for bar in ("", "_error")
 )
-_OF_LOOSE = ("interface_force", "interface_force_error", *_OF_REST[2:4])
+_OF_LOOSE = ("interface_force", "interface_force_error", "interface_area", *_OF_REST[2:4])
 _OF_JAW = ("jaw_force", "jaw_force_error", "jaw_contact_area", "jaw_contact_area_error")
 _OF_PULL = tuple(
     f"{name}{bar}"
@@ -98,6 +98,7 @@ _PARTS = (
     _Part(_OF_SHAPE, of=lambda case: case.imaged is not None),
     _Part(_OF_REST, of=lambda case: case.body.resting is not None),
     _Part(_OF_LOOSE, of=lambda case: case.body.loose is not None),
+    _Part(("interface_force_vector",), ("component",), of=lambda case: case.body.loose is not None),
     _Part(_OF_JAW, of=lambda case: case.jaw is not None),
     _Part(("jaw_torque", "jaw_torque_error"), of=lambda case: case.jaw is not None and case.way.rubs),
     _Part(("jaw_force_vector",), ("component",), of=lambda case: case.jaw is not None),
@@ -185,7 +186,7 @@ def _value(record: Record | None, case: Case, name: str, dims: Sequence[str]) ->
     value, own = nan, name.replace("_exact", "")
     if record and name in _OF_LOADS and record.is_ok and not case.load.acts:
         value = 0.0
-    elif name == "jaw_force_vector":
+    elif name in ("jaw_force_vector", "interface_force_vector"):
         found = record.largest if record and record.is_ok else {}
         return np.array([found.get(f"{name}_{axis}", nan) for axis in "xyz"], dtype=float)
     elif record and (record.is_ok or record.status == NO_CONTACT or own in _OF_FAILURES):

@@ -23,7 +23,8 @@ _ENDED = "load steps end there"
 _OF_DEPTH = ("contact_area", "contact_radius", "energy_release", "slip_area", "friction_force", "torque")
 # Forces of two jaws, and on a loose layer, among the further numbers of a record.
 _OF_JAWS = ("jaw_force", "closed_force", "pull_force", "jaw_pull_force", "slip_begins_force", "slip_whole_force")
-_FURTHER_FORCES = (*_OF_JAWS, "interface_force", *(f"jaw_force_vector_{axis}" for axis in "xyz"))
+_VECTORS = tuple(f"{name}_force_vector_{axis}" for name in ("jaw", "interface") for axis in "xyz")
+_FURTHER_FORCES = (*_OF_JAWS, "interface_force", *_VECTORS)
 _ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 
 

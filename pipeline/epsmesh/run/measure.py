@@ -153,7 +153,8 @@ def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
     if case.body.loose is None or rest is None:
         return of_rest(solution)
     found = {"interface_force": rest.pressed, "interface_force_error": rest.force_bar * abs(rest.pressed)}
-    return found | {"lift_off_area": rest.lifted, "lift_off_area_error": rest.bar * rest.area}
+    found |= {"lift_off_area": rest.lifted, "lift_off_area_error": rest.bar * rest.area}
+    return found | {"interface_area": rest.area + rest.lifted} | _by_axis("interface_force_vector", case, rest.force)
 
 
 def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, float]:
@@ -164,7 +165,7 @@ def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, 
     if contact is None or contact.rest is None:
         return {}
     rest = contact.rest
-    vector = turned_back(case.frame.turn, (0.0 - rest.force[0], 0.0 - rest.force[1], 0.0 - rest.force[2]))
+    x, y, z = rest.force
     return {
         "jaw_force": rest.pressed,
         "jaw_force_error": rest.force_bar * abs(rest.pressed),
@@ -173,8 +174,13 @@ def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, 
         "jaw_torque": rest.torque,
         "jaw_torque_error": rest.torque_bar,
         **_of_pull(contact.pull, bar),
-        **{f"jaw_force_vector_{axis}": part for axis, part in zip("xyz", vector, strict=True)},
+        **_by_axis("jaw_force_vector", case, (0.0 - x, 0.0 - y, 0.0 - z)),
     }
+
+
+def _by_axis(name: str, case: Case, vector: Vector) -> dict[str, float]:
+    """Return a ``vector`` of the turned mesh by its components in the body's coordinates."""
+    return {f"{name}_{axis}": part for axis, part in zip("xyz", turned_back(case.frame.turn, vector), strict=True)}
 
 
 def _of_pull(pull: PullResult | None, bar: float) -> dict[str, float]:

@@ -68,7 +68,6 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
     """
     if case.probe.crack:
         raise CaseFailure("a needle that is inserted is solved in a plane section, in a round scene only")
-    _check_loose(case, spaces.body.mirrored)
     tool = tool_of(case) if case.way.is_found else None
     degree, conditions = case.mesh.degree, conditions_of(case)
     if tool is not None and spaces.body.is_halved:  # the second jaw is the image of the tool
@@ -86,23 +85,6 @@ def problem_of(spaces: Spaces, case: Case, *, reuse: bool = False, condense: boo
             spaces.close()
             show_image(shape.body)
         raise
-
-
-def _check_loose(case: Case, mirrored: tuple[int, ...]) -> None:
-    """Check that something holds the loose layer of a case across the axis; planes of symmetry are ``mirrored``.
-
-    Raises:
-        CaseFailure: if nothing does.
-    """
-    loose = case.body.loose
-    if loose is None or loose.friction == inf or case.body.hold.holds_above(loose.height):
-        return
-    if free := [axis for number, axis in enumerate("xy") if number not in mirrored]:
-        layer = case.body.regions[loose.number].name
-        raise CaseFailure(
-            f'the layer "{layer}" floats: the tissue below it lets it move along {free[0]}, and nothing else prevents '
-            'that; give it friction = "stick", fix the sides of the body, or place the tool in the planes of symmetry'
-        )
 
 
 def memory_of(case: Case, dofs: int) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.probe import Probe
-from epsmesh.solve.contact.bed import Bed, support_of
+from epsmesh.solve.contact.bed import Bed, LooseTissue, support_of, tissue_below
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.study.case import Case
 
@@ -47,7 +47,7 @@ def beds_on(case: Case) -> tuple[str, ...]:
 def beds_of(case: Case) -> tuple[Bed, ...]:
     """Return what touches the body of ``case`` besides the tool, for the same mesh.
 
-    It is its support, a second jaw, or the tissue below a loose layer.
+    It is its support, a second jaw, or what loose tissue touches.
     """
     resting, ground, turn = case.body.resting, case.body.ground, case.frame.turn
     found = list[Bed]()
@@ -56,8 +56,8 @@ def beds_of(case: Case) -> tuple[Bed, ...]:
     if case.jaw is not None:
         found.append(_jaw_of(case, case.jaw))
     if (loose := case.body.loose) is not None:
-        level = Ground((0.0, 0.0, loose.height), (0.0, 0.0, 1.0))
-        found.append(replace(support_of(_turned(level, turn), loose.friction), is_tissue=True))
+        axes = np.eye(3) if turn is None else turn.T
+        found.append(tissue_below(LooseTissue(loose.name, loose.parts, axes), loose.friction, is_level=loose.is_level))
     return tuple(found)
 
 

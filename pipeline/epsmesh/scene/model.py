@@ -33,7 +33,7 @@ from epsmesh.shapes.surface import Surface, Tube
 # Names of the physical groups. Every boundary face is in exactly one of them.
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
 JAW = "jaw"  # what a second jaw may touch
-LOOSE, BELOW = "loose", "below"  # where a loose layer touches the tissue below it, and the other side
+LOOSE, BELOW = "loose", "below"  # where loose tissue touches other tissue, and the other side
 SLIT = "slit"  # the part of a slit's faces that the blade does not touch
 # Those of planes of symmetry, by the names of these: of x, of y, and between two jaws.
 MIRROR = {"x": "mirror_x", "y": "mirror_y", MIDDLE: "mirror_middle"}

@@ -190,8 +190,10 @@ class Body(Section, ABC):
 
     @property
     def loose(self) -> Loose | None:
-        """The layer that lies loose on the tissue below it; None if all are bonded."""
-        return None
+        """The layer or the region that lies loose on other tissue; None if all are bonded."""
+        pieces = zip(range(1, 1 + len(self.regions)), self.regions, self.places, strict=True)
+        found = (Loose(each.name, place, each.friction, (n,)) for n, each, place in pieces if each.contact != "bonded")
+        return next(found, None)
 
     @property
     def ground(self) -> Ground | None:
@@ -355,10 +357,13 @@ class Layered(Drawn):
 
     @property
     def loose(self) -> Loose | None:
-        """The layer that lies loose."""
-        pairs = zip(range(len(self.layer)), self.layer, self.interfaces, strict=False)
-        found = (Loose(n, end, layer.friction) for n, layer, end in pairs if layer.contact == "unilateral")
-        return next(found, None)
+        """The layer that lies loose, or the region."""
+        for number, (layer, _) in enumerate(zip(self.layer, self.interfaces, strict=False), start=1):
+            if layer.contact != "bonded":
+                parts = tuple(range(1, number + 1))
+                return Loose(layer.name, self.places[number - 1], layer.friction, parts, is_level=True)
+        loose = super().loose
+        return None if loose is None or loose.place.startswith("layer") else loose
 
     @property
     def ground(self) -> Ground | None:

@@ -43,13 +43,14 @@ class Distance:
     def along(direction: FloatArray, heights: FloatArray, moved: FloatArray) -> "Distance":
         """Return the distance of linear elasticity: that along a unit ``direction``, above places at rest.
 
-        ``heights`` (n) are those of the tool there, ``moved`` (n, d) the displacements.
+        ``heights`` (n) are those of the tool there, ``moved`` (n, d) the displacements. There is one direction (d), or
+        one at each point (n, d).
         """
         normal, curvature = (
             np.broadcast_to(-direction, moved.shape),
             np.broadcast_to(0.0, (*moved.shape, moved.shape[1])),
         )
-        return Distance(heights - moved @ direction, normal, curvature)
+        return Distance(heights - np.einsum("ni,ni->n", moved, -normal), normal, curvature)
 
     @staticmethod
     def along_axis(heights: FloatArray, moved: FloatArray) -> "Distance":

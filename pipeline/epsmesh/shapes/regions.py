@@ -25,6 +25,22 @@ class Region(Tissue):
             '"skin"',
         ),
     ]
+    contact: Annotated[
+        Literal["bonded", "unilateral"],
+        Words(
+            "Contact of a layer with the tissue below it, of a region with all tissue that it touches: bonded, or "
+            "unilateral, where it presses, slides, and may lift off.",
+            '"unilateral"',
+        ),
+    ] = "bonded"
+    friction: Annotated[
+        Friction,
+        Words(
+            "Coulomb's coefficient of friction where its contact is unilateral, or stick: tissue that touches does not "
+            "slide. The dataset writes stick as infinity.",
+            '[0.0, 0.3, "stick"]',
+        ),
+    ] = 0.0
 
 
 class Layer(Region):
@@ -38,32 +54,21 @@ class Layer(Region):
         Toughness | None,
         Words("Toughness of the layer, for a tool that is inserted.", '"500 J/m^2"', default="that of the probe's key"),
     ] = None
-    contact: Annotated[
-        Literal["bonded", "unilateral"],
-        Words(
-            "Contact of the layer with the tissue below it: bonded, or unilateral, where it presses, slides, and may "
-            "lift off.",
-            '"unilateral"',
-        ),
-    ] = "bonded"
-    friction: Annotated[
-        Friction,
-        Words(
-            "Coulomb's coefficient of friction between the layer and the tissue below it, or stick: tissue that "
-            "touches does not slide. The dataset writes stick as infinity.",
-            '[0.0, 0.3, "stick"]',
-        ),
-    ] = 0.0
 
 
 @dataclass(frozen=True)
 class Loose:
-    """A layer that lies loose on the tissue below it: its ``number`` among the layers, from 0, its lower end (m), and
-    Coulomb's coefficient of ``friction`` there, infinite where it sticks."""
+    """A layer that lies loose on the tissue below it, or a region on all that it touches: its ``name``, its ``place``
+    in a study, such as layer[2], and Coulomb's coefficient of ``friction``, infinite where it sticks.
 
-    number: int
-    height: float
+    ``parts`` are the numbers in meshes of what lies loose: those of layers above are among them. A layer ``is_level``.
+    """
+
+    name: str
+    place: str
     friction: float
+    parts: tuple[int, ...]
+    is_level: bool = False
 
 
 class Embedded(Region):

@@ -55,10 +55,6 @@ class Support(ABC):
         """Return the heights z (m) at which the support ends in the middle of a face."""
         return ()
 
-    def holds_above(self, height: float) -> bool:
-        """Return whether the sides of the body are fixed somewhere above a ``height`` z (m)."""
-        return self.gap(0.0) == 0.0
-
     def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m).
 
@@ -140,10 +136,6 @@ class Below(BaseModel, Support):
     def edges(self) -> tuple[float, ...]:
         """Return the height."""
         return (self.below,)
-
-    def holds_above(self, height: float) -> bool:
-        """Return whether the sides are fixed above another ``height`` (m)."""
-        return self.below > height
 
     def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Report a height outside the body, or so near one of its ends that elements would be slivers."""

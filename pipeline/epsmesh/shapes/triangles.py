@@ -9,6 +9,9 @@ import numpy as np
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.shapes.frame import Vector
 
+# Bits of a point's number: three of them fit one integer.
+_POINT_BITS = 21
+
 
 class SurfaceError(ValueError):
     """A file does not bound a piece of tissue. The message says what was found in it and how to repair it."""
@@ -80,6 +83,12 @@ def edge_keys(facets: IntArray, count: int) -> IntArray:
     pairs = np.sort(half_edges(facets), axis=1)
     keys: IntArray = pairs[:, 0] * count + pairs[:, 1]
     return keys
+
+
+def facet_keys(facets: IntArray) -> IntArray:
+    """Return one integer for each facet (k, 3), whatever the order of its points."""
+    low, middle, high = np.sort(facets, axis=1).T.astype(np.int64)
+    return np.asarray((low << 2 * _POINT_BITS) | (middle << _POINT_BITS) | high)
 
 
 def closed_edges(facets: IntArray) -> tuple[IntArray, IntArray]:

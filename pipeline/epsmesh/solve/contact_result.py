@@ -94,7 +94,8 @@ class RestResult:
     """A body on a support that lets go, or held by a second jaw: its ``force`` (3), N, on the body, the ``area`` (m²)
     in contact, and the rest of what it may touch, which has ``lifted`` off (m²).
 
-    ``normal`` (3) is the unit vector into the body. ``bar`` is the relative 95 % bar on the area, ``force_bar`` that on
+    ``normal`` (3) is the unit vector into the body, zero where it is another one at each place. ``pressed`` (N) is the
+    force along it. ``bar`` is the relative 95 % bar on the area, ``force_bar`` that on
     the force of a jaw, NaN if unknown. ``torque`` (N m) is that of the tissue on a jaw with friction about its advance,
     ``slip`` (m) the largest distance by which tissue has gone along a support on which it is.
     """
@@ -109,11 +110,7 @@ class RestResult:
     torque_bar: float = nan
     slip: float = nan
     slip_bar: float = nan
-
-    @property
-    def pressed(self) -> float:
-        """The force (N) along the normal."""
-        return sum(n * f for n, f in zip(self.normal, self.force, strict=True))
+    pressed: float = nan
 
     def with_least_bar(self, share: float) -> "RestResult":
         """Return it with relative bars on force and area of a jaw of at least ``share``."""

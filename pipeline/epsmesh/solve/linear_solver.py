@@ -183,6 +183,9 @@ class LinearSolver:
         held = [_NONE if level.held is None else level.held for level in self.levels[1:]]
         masks = [(free(lower), free(upper)) for lower, upper in itertools.pairwise(self.levels)]
         self.cycle.hold(held, masks, coarse)
+        if self.levels[0].pairs is not None:
+            operators = [operator_of(level.matrix) for level in self.levels[1:]]
+            self.cycle.join(operators, [level.pairs for level in self.levels])
 
     @property
     def matrix(self) -> PETSc.Mat:

@@ -77,6 +77,22 @@ def apply_loads(loads: Loads, body: BodyMesh, space: Any) -> Applied:
         return Applied(body.comm, forces.array.copy(), float(totals[:, 3].sum()), totals[:, :3].sum(axis=0))
 
 
+def pressed_by(body: BodyMesh, space: Any, group: str) -> FloatArray:
+    """Return the nodal forces (N), on owned dofs of ``space``, of a pressure of 1 Pa on a ``group`` of facets;
+    collective."""
+    dofs, facets = compat.cell_dofs(space), boundary_of(body, (group,))
+    every = np.ones(len(facets.cells), dtype=bool)
+    with vector(space) as forces:
+        with forces.localForm() as local:
+            nodal = np.zeros((local.getLocalSize() // 3, 3))
+            for part, points, areas in _areas_at_points(facets, every, None, compat.degree(space)):
+                shares = np.einsum("qi,cqx->cix", table_of(compat.degree(space), points)[0], -areas)
+                np.add.at(nodal, dofs[facets.cells[part]].reshape(-1), shares.reshape(-1, 3))
+            local.array[:] = nodal.reshape(-1)
+        add_from_ghosts(forces)
+        return np.array(forces.array)
+
+
 def _add_weights(
     weights: tuple[Vector, ...], body: BodyMesh, space: Any, dofs: Int32Array, nodal: FloatArray
 ) -> list[float]:

@@ -11,7 +11,7 @@ from epsmesh.shapes.friction import STICK
 from epsmesh.shapes.from_file import FromFile
 from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.probe import Probe
-from epsmesh.shapes.regions import Embedded, Layer
+from epsmesh.shapes.regions import Embedded
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
 from epsmesh.shapes.support import NONE, Faces, NamedFace
@@ -90,19 +90,24 @@ def _check_rest(body: Body, problems: Problems) -> None:
 
 
 def _check_loose(body: Body, problems: Problems) -> None:
-    """Report a second loose layer, one that nothing is below, and friction of a layer that is bonded."""
+    """Report second loose tissue, what touches no other or has none, and friction of tissue that is bonded."""
     loose = body.loose
-    for number, layer in enumerate(body.pieces.get("layer", ())):
-        assert isinstance(layer, Layer)
-        key = f"body.layer[{number + 1}]"
-        if layer.contact == "bonded":
-            if layer.friction:
-                without = 'is of a layer with contact = "unilateral": a bonded one does not slide. Omit it'
-                problems.error(f"{key}.friction", STICK if layer.friction == inf else layer.friction, without)
+    for place, piece in zip(body.places, body.regions, strict=True):
+        key = f"body.{place}"
+        if piece.contact == "bonded":
+            if piece.friction:
+                without = 'is of tissue with contact = "unilateral": what is bonded does not slide. Omit it'
+                problems.error(f"{key}.friction", STICK if piece.friction == inf else piece.friction, without)
         elif loose is None:
-            problems.error(f"{key}.contact", layer.contact, "must be bonded in the last layer: no tissue is below it")
-        elif number != loose.number:
-            problems.error(f"{key}.contact", layer.contact, "is computed of one layer only, and another one has it")
+            problems.error(f"{key}.contact", piece.contact, "must be bonded in the last layer: no tissue is below it")
+        elif place != loose.place:
+            what = f"is computed of one layer or region only, and {loose.name} has it"
+            problems.error(f"{key}.contact", piece.contact, what)
+        elif isinstance(piece, Embedded) and (piece.is_hollow or piece.capsule):
+            has = (
+                "is of tissue: omit `hollow`, or it" if piece.is_hollow else "is not computed below a capsule: omit one"
+            )
+            problems.error(f"{key}.contact", piece.contact, has)
 
 
 def _check_imaged(body: Body, loads: Sequence[Load], problems: Problems) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 from epsmesh import compat
 from epsmesh.files import atomic
 from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.shapes.triangles import facet_keys
 from epsmesh.solve.points.derived import von_mises
 from epsmesh.view.fields import Fields
-from epsmesh.view.numbers import keys_of
 
 # Names of cells for meshio, and degrees, by the number of nodes.
 _KINDS = {4: "tetra", 10: "tetra10", 20: "VTK_LAGRANGE_TETRAHEDRON"}
@@ -64,9 +64,9 @@ def _marked(fields: Fields, group: str, count: int, cells: np.ndarray) -> np.nda
     marks = np.zeros(count, dtype=np.int32)
     nodes = compat.equidistant_nodes(_DEGREES[cells.shape[1]])
     weights = np.column_stack([1 - nodes.sum(axis=1), nodes])
-    known = keys_of(fields.facets[group])
+    known = facet_keys(fields.facets[group])
     for corner in range(4):
         facets = np.delete(fields.cells[:, :4], corner, axis=1)
-        chosen = np.isin(keys_of(facets), known)
+        chosen = np.isin(facet_keys(facets), known)
         marks[cells[np.ix_(chosen, np.abs(weights[:, corner]) < _ZERO)]] = 1
     return marks

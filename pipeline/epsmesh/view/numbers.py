@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from epsmesh.arrays import FloatArray, IntArray
 from epsmesh.scene.model import CUT, FIXED, JAW, PROBE
+from epsmesh.shapes.triangles import facet_keys
 from epsmesh.view.fields import Fields
 from epsmesh.view.palette import VIRIDIS, YLGNBU, YLORRD, region_colours
 from epsmesh.view.tool import tool_of
@@ -27,8 +28,6 @@ _SMALL = 1e-4
 _HALF = 32767
 # Bits of a coordinate along Morton's curve.
 _BITS = 10
-# Bits of a point's number: three of them fit one integer.
-_POINT_BITS = 21
 # The corners of a tetrahedron's face, by the corner that it lies opposite to.
 FACES = np.array(((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)))
 
@@ -139,7 +138,7 @@ def _faces(
     triangles = np.vstack(list(facets.values()))
     is_on = np.isin(np.arange(corners.max() + 1), triangles)
     near = np.flatnonzero(is_on[corners[:, FACES]].all(axis=-1))  # 4 × cell + the corner opposite to the face
-    known, faces = keys_of(triangles), keys_of(corners[:, FACES].reshape(-1, 3)[near])
+    known, faces = facet_keys(triangles), facet_keys(corners[:, FACES].reshape(-1, 3)[near])
     groups = np.repeat([_GROUPS.get(name, 0) for name in facets], [len(facet) for facet in facets.values()])
     _, place, found = np.intersect1d(faces, known, return_indices=True)
     if len(found) < len(known):
@@ -154,12 +153,6 @@ def _faces(
         values = np.concatenate([pressure.get(name, np.zeros(len(facet))) for name, facet in facets.items()])
         arrays["pressures"] = np.round(255 * values / (values.max() or 1.0)).astype("u1")[found[order]]
     return arrays
-
-
-def keys_of(triples: IntArray) -> IntArray:
-    """Return one integer for each triple (k, 3) of numbers of points, whatever their order."""
-    low, middle, high = np.sort(triples, axis=1).T.astype(np.int64)
-    return np.asarray((low << 2 * _POINT_BITS) | (middle << _POINT_BITS) | high)
 
 
 def _steps(values: FloatArray, low: float) -> npt.NDArray[np.uint8]:

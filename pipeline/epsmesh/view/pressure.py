@@ -7,8 +7,8 @@ import numpy as np
 from epsmesh import compat
 from epsmesh.arrays import FloatArray
 from epsmesh.mesh.generate import MeshArrays
+from epsmesh.shapes.triangles import facet_keys
 from epsmesh.solve.points.state import State
-from epsmesh.view.numbers import keys_of
 
 _CORNERS = np.vstack([np.zeros(3), np.eye(3)])  # of the reference cell
 
@@ -28,7 +28,7 @@ def pressures_of(
     for opposite in range(4):
         cells = np.flatnonzero(touched.touched_facets[:, opposite])
         middle = np.delete(_CORNERS, opposite, axis=0).mean(axis=0)
-        keys.append(keys_of(np.delete(corners[cells], opposite, axis=1)))
+        keys.append(facet_keys(np.delete(corners[cells], opposite, axis=1)))
         pressures.append(touched.of_cells(cells, middle[None]).contact)
     parts = body.comm.gather((np.concatenate(keys), np.concatenate(pressures)))
     if parts is None or arrays is None:
@@ -36,6 +36,6 @@ def pressures_of(
     key, pressure = (np.concatenate(part) for part in zip(*parts, strict=True))
     order, found = np.argsort(key), {}
     for name in groups:
-        place = order[np.searchsorted(key[order], keys_of(arrays.facets[name]))]
+        place = order[np.searchsorted(key[order], facet_keys(arrays.facets[name]))]
         found[name] = np.tile(np.maximum(pressure[place], 0.0), 2 ** len(mirrors))
     return found

@@ -1,4 +1,4 @@
-"""Contacts besides the tool's: a support off which a body may lift, an opposite jaw, or tissue below a loose layer.
+"""Contacts besides the tool's: a support off which a body may lift, an opposite jaw, or tissue below loose tissue.
 
 A contact is a constraint between nodes of a surface and a distance. All contacts of a body are found together, in one
 loop: the tool's nodes have the tool's distance, those above a bed have the bed's.
@@ -31,6 +31,16 @@ def above_places(
     return lambda points, depth: Distance.along(normal, heights(depth), points - places)
 
 
+@dataclass(frozen=True, eq=False)
+class LooseTissue:
+    """What lies loose on other tissue: its ``name``, and the numbers of its regions, ``parts``. The rows of ``axes``
+    (3, 3) are those of the body's coordinates on the mesh."""
+
+    name: str
+    parts: tuple[int, ...]
+    axes: FloatArray
+
+
 @dataclass(frozen=True)
 class Bed:
     """A rigid surface by its ``distance`` from points (n, 3), m, where the tool is at a depth (m) from its first touch.
@@ -43,8 +53,8 @@ class Bed:
     It is a support, or a jaw that has an edge: ``ends_at`` is a mask of points (n, 3) on the edge of its candidates,
     true where it ends itself. A jaw advances along its normal by ``pace`` times the tool's depth; ``foot`` (m) is on
     its axis, and ``is_sharp`` says that it ends at a sharp edge. ``touched`` is the outward unit normal of the surface
-    where a jaw first touches it, if that is inclined to its axis. ``is_tissue``: it is the tissue below a loose layer,
-    whose displacements are those relative to it.
+    where a jaw first touches it, if that is inclined to its axis. Or it is what loose ``tissue`` touches, whose
+    displacements are those relative to it.
     """
 
     distance: Callable[[FloatArray, float], Distance]
@@ -56,9 +66,14 @@ class Bed:
     pace: float = 0.0
     ends_at: Callable[[FloatArray], BoolArray] | None = None
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    is_tissue: bool = False
     is_sharp: bool = False
     touched: tuple[float, float, float] | None = None
+    tissue: LooseTissue | None = None
+
+    @property
+    def is_tissue(self) -> bool:
+        """Whether it is tissue."""
+        return self.tissue is not None
 
     @property
     def is_support(self) -> bool:
@@ -75,14 +90,17 @@ class Bed:
         """How far (3), m, it goes where the tool goes 1 m."""
         return self.pace * np.array(self.normal)
 
-    def at_rest(self, places: FloatArray) -> "Bed":
+    def at_rest(self, places: FloatArray, normals: FloatArray | None = None) -> "Bed":
         """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along its axis.
 
-        Of a jaw that is inclined to the surface, they are along the surface's normal.
+        Of a jaw that is inclined to the surface, they are along the surface's normal. Those to tissue are along the
+        ``normals`` (n, 3) of its nodes, and zero at rest.
         """
         if self.touched is not None:
             return replace(self, distance=above_places(self.distance, np.array(self.touched), places))
         heights, outward = self.height(places), -np.array(self.normal)
+        if self.is_tissue and normals is not None:
+            outward = -normals
         return replace(
             self,
             distance=lambda points, depth: Distance.along(outward, heights - self.pace * depth, points - places),
@@ -127,6 +145,17 @@ def support_of(ground: Ground, friction: float) -> Bed:
     is_flat = not ground.across
     sticks = is_flat and friction == inf
     return Bed(lambda points, _: ground.distance(points), ground.normal, ground.height, friction, sticks, is_flat)
+
+
+def tissue_below(tissue: LooseTissue, friction: float, *, is_level: bool) -> Bed:
+    """Return what loose ``tissue`` touches at rest, along the normals of its nodes: below it, if it ``is_level``."""
+
+    def no_distance(points: FloatArray, _: float) -> Distance:
+        raise NotImplementedError("tissue has gaps to other tissue at rest only")
+
+    x, y, z = map(float, tissue.axes[2] if is_level else np.zeros(3))
+    at_rest, sticks = lambda points: np.zeros(len(points)), friction == inf
+    return Bed(no_distance, (x, y, z), at_rest, friction, sticks, tissue=tissue)
 
 
 @dataclass(frozen=True, eq=False)

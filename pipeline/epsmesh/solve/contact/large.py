@@ -21,6 +21,7 @@ from epsmesh.solve.contact.contact_steps import (
     reach_contact_with_friction,
 )
 from epsmesh.solve.contact.corrections import Corrections
+from epsmesh.solve.contact.floating import check_loose
 from epsmesh.solve.contact.large_solution import Beside, LargeContactSolution
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import placed_tool
@@ -57,6 +58,8 @@ class LargeContact:
         self._surface, self._elements, self._tool = surface, elements, tool
         self._law, self._loads = asked.law, asked.movement.loads
         space, is_loaded = elements.displacements, self._loads is not None
+        for bed in tool.beds:
+            check_loose(surface, elements.degree, bed)
         self._smooth = without_friction(space, tool, is_loaded=is_loaded) if tool.rubs else tool
         self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
         self._sagged: Sagged | None = None

@@ -6,16 +6,19 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from epsmesh.arrays import BoolArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.scene.model import BELOW, LOOSE, PROBE
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
+from epsmesh.solve.contact.normals import means_of, nodal_normals
 from epsmesh.solve.contact.numbering import Numbering, Pairs, pairs_of
+from epsmesh.solve.contact.parts import part_of
 from epsmesh.solve.contact.surface import Candidates, find_candidates
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.kernels.product import is_product
 from epsmesh.solve.krylov import keep
 from epsmesh.solve.linear_solver import Level
+from epsmesh.solve.loads import pressed_by
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.solve.spaces import ElasticSpace, Spaces
 
@@ -42,17 +45,26 @@ class Surface:
         return self._found[degree]
 
     def pairs(self, degree: int) -> Pairs | None:
-        """Return the pairs of nodes of a loose layer and the tissue below it; None without one; collective."""
+        """Return the pairs of nodes of loose tissue and the tissue below it; None without any; collective."""
         if degree not in self._pairs:
-            beds, found = self._conditions.beds, None
-            if LOOSE in beds:
-                own = self.of(degree).of_contacts[1 + beds.index(LOOSE)]
-                space = self.space(degree)
-                is_free = np.ones(space.owned)
-                is_free[space.prescribed_owned] = 0.0
-                found = pairs_of(space.space, self.spaces.body.facets[BELOW], self.of(degree), own, is_free)
-            self._pairs[degree] = found
+            self._pairs[degree] = self._pairs_of(degree) if LOOSE in self._conditions.beds else None
         return self._pairs[degree]
+
+    def _pairs_of(self, degree: int) -> Pairs:
+        loose = part_of(self.of(degree), 1 + self._conditions.beds.index(LOOSE))
+        space, nodes = self.space(degree), np.arange(len(self.of(degree)))[loose.nodes]
+        is_free = np.ones(space.owned)
+        is_free[space.prescribed_owned] = 0.0
+        means = np.zeros((len(loose.candidates.facets), 3))
+        if degree > 1 and (first := self.pairs(1)) is not None:
+            lowest = part_of(self.of(1), 1 + self._conditions.beds.index(LOOSE)).candidates
+            means = means_of(lowest.facets, first.normal)
+
+        def normal(upper: Numbering, free: FloatArray) -> FloatArray:
+            pressed = upper.gather_vectors(pressed_by(self.spaces.body, space.space, LOOSE))
+            return nodal_normals(loose.candidates, pressed, means, free)
+
+        return pairs_of(space.space, self.spaces.body.facets[BELOW], self.of(degree), nodes, is_free, normal)
 
     def space(self, degree: int) -> ElasticSpace:
         """Return the space of a ``degree`` without a tool; collective."""
@@ -85,10 +97,10 @@ class Hierarchy:
                 stack,
                 direct=direct,
                 masked=masks and not direct and space.degree > 1,
-                pairs=surface.pairs(space.degree),
             )
             for space in found
         ]
+        self._pairs = [surface.pairs(space.degree) for space in found]
         self._candidates = [surface.of(d) for d in degrees]
         self._numberings = [Numbering(s.space, c.numbers) for s, c in zip(found, self._candidates, strict=True)]
 
@@ -107,17 +119,21 @@ class Hierarchy:
 
         Those that are ``firm`` (n), too, are fixed along all axes. ``floats``: nothing else holds the body.
         """
-        dofs = [numbering.normal_dofs(chosen) for numbering, chosen in self._on_levels(active, floats=floats)]
-        if firm is not None:
-            whole = (numbering.all_dofs(chosen) for numbering, chosen in self._on_levels(firm))
-            dofs = [np.union1d(*both).astype(np.int32) for both in zip(dofs, whole, strict=True)]
-        return [operator.hold(own) for operator, own in zip(self._operators, dofs, strict=True)]
+        sets = self._on_levels(active, floats=floats)
+        whole = [None] * len(sets) if firm is None else self._on_levels(firm)
+        levels = zip(self._operators, self._numberings, self._pairs, sets, whole, strict=True)
+        found = list[Level]()
+        for operator, numbering, pairs, normal, every in levels:
+            dofs = numbering.normal_dofs(normal)
+            if every is not None:
+                dofs = np.union1d(dofs, numbering.all_dofs(every)).astype(np.int32)
+            found.append(operator.hold(dofs, None if pairs is None else pairs.holding(normal, every)))
+        return found
 
-    def _on_levels(self, chosen: BoolArray, *, floats: bool = False) -> list[tuple[Numbering, BoolArray]]:
-        """Return the numbering of each level, and which of its candidates are ``chosen`` (n), by majority."""
+    def _on_levels(self, chosen: BoolArray, *, floats: bool = False) -> list[BoolArray]:
+        """Return which candidates of each level are ``chosen`` (n), by majority."""
         *coarser, finest = self._candidates
-        sets = [*(finest.lowered(chosen, lower, floats=floats) for lower in coarser), chosen]
-        return list(zip(self._numberings, sets, strict=True))
+        return [*(finest.lowered(chosen, lower, floats=floats) for lower in coarser), chosen]
 
     def hold_facets(self, facets: Int32Array) -> list[Level]:
         """Return the levels with all of the local ``facets`` fixed, valid until the next call; collective."""
@@ -138,31 +154,31 @@ class HeldOperator:
         *,
         direct: bool,
         masked: bool,
-        pairs: Pairs | None = None,
     ):
-        """Assemble; collective. Matrices are freed with the ``stack``. With ``pairs`` the operator is that of S."""
+        """Assemble; collective. Matrices are freed with the ``stack``."""
         matrix = stack.enter_context(space.lend(law, entries=direct or space.degree == 1))
-        self._pairs = pairs
-        if pairs is not None:
-            matrix = keep(stack, _joined(matrix, pairs, stack))
         self.space, self._matrix, self._law, self._is_masked = space, matrix, law, masked
         self.free, self._is_held, self._stack = matrix, False, stack
         if not masked and not is_product(matrix):
             # An assembled PETSc matrix multiplies faster than its copy: other matrices are made from the copy.
             self.free = matrix.copy()
             stack.callback(self.free.destroy)
+        self._joined = stack.enter_context(ExitStack())
 
-    def hold(self, dofs: Int32Array) -> Level:
+    def hold(self, dofs: Int32Array, pairs: Pairs | None = None) -> Level:
         """Return the level with the local ``dofs`` (unrolled, owned and ghosts) fixed, too; collective.
 
-        It is valid until the next call.
+        It is valid until the next call. With ``pairs`` its unknowns, and these dofs, are those of S.
         """
         space, matrix, is_uniform = self.space, self._matrix, self._law.is_uniform
+        if pairs is not None:
+            self._joined.close()
+            matrix = keep(self._joined, _joined(self.free, pairs))
         if not self._is_masked and is_product(matrix):
             matrix = matrix.getPythonContext().holding(dofs).matrix()
             self._stack.callback(matrix.destroy)
         elif not self._is_masked:
-            if self._is_held:
+            if self._is_held and pairs is None:
                 self.free.copy(matrix, structure=_SAME)
             self._is_held = True
             first, _ = matrix.getOwnershipRange()
@@ -173,15 +189,16 @@ class HeldOperator:
             prescribed=np.union1d(space.prescribed, dofs),
             jumps=not is_uniform or space.factors is not None,
             held=dofs if self._is_masked else None,
-            pairs=self._pairs,
+            pairs=pairs,
         )
 
 
-def _joined(matrix: PETSc.Mat, pairs: Pairs, stack: ExitStack) -> PETSc.Mat:
-    """Return an operator in the unknowns of ``pairs``."""
+def _joined(matrix: PETSc.Mat, pairs: Pairs) -> PETSc.Mat:
+    """Return an operator in the unknowns of ``pairs``, which the caller destroys."""
     if is_product(matrix):
         return matrix.getPythonContext().joined(pairs).matrix()
-    found = matrix.ptap(keep(stack, pairs.matrix(matrix)))
+    with ExitStack() as stack:
+        found = matrix.ptap(keep(stack, pairs.matrix(matrix)))
     found.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     found.setOption(PETSc.Mat.Option.SPD, True)
     return found

@@ -1,10 +1,12 @@
 """Candidates among the dofs of a space, and pairs of nodes where two surfaces of tissue touch."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -14,6 +16,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.solve import SolveError
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.surface import Candidates
+from epsmesh.solve.contact.turned import turned_frames
 
 # Nodes of both surfaces are at the same place within this share of the surface's extent.
 _SAME = 1e-7
@@ -83,57 +86,97 @@ class Numbering:
 class Pairs:
     """Pairs of nodes of two surfaces of tissue that touch: ``upper`` and ``lower`` ones, n each, at the same places.
 
-    Contact holds the displacement w of an upper node relative to its lower one. Displacements are therefore written as
-    u = S v, in which v has w at the upper nodes, and u elsewhere; forces follow by the transpose. ``free`` (n, 3) is 0
-    at prescribed components of upper nodes, else 1: there the lower one is prescribed, too. All methods change values
-    on owned dofs (unrolled), in any precision, and are collective. ``nodes`` (n) are the upper ones among the
-    candidates.
+    Contact holds the displacement w of an upper node relative to its lower one, along the unit ``normal`` (n, 3) into
+    the upper body, and where tissue sticks. Displacements are therefore written as u = S v. At upper nodes v is in
+    ``frames`` (n, 3, 3) whose columns are axes, the normal last, and has w along those axes that are ``tied`` (n, 3), 1
+    or 0; elsewhere it is u. What does not touch is thus two bodies, and what sticks is one. Forces follow by the
+    transpose. ``free`` (n, 3) is 0 at prescribed components of upper nodes, else 1: there the lower one is prescribed,
+    too. All methods change values on owned dofs (unrolled), in any precision, and are collective. ``nodes`` (n) are the
+    upper ones among the candidates.
     """
 
     upper: Numbering
     lower: Numbering
     free: FloatArray
     nodes: IntArray
+    normal: FloatArray
+    frames: FloatArray
+    tied: FloatArray
+
+    def holding(self, active: BoolArray, firm: BoolArray | None) -> "Pairs":
+        """Return the pairs for ``active`` candidates (m), which are held along the normal, and ``firm`` ones."""
+        tied = np.zeros_like(self.tied)
+        tied[:, -1] = active[self.nodes]
+        if firm is not None:
+            tied[firm[self.nodes]] = 1.0
+        return replace(self, tied=tied)
+
+    @cached_property
+    def _coupling(self) -> FloatArray:
+        """What upper nodes have of the displacement of their lower ones, (n, 3, 3)."""
+        found = np.einsum("nij,nj,nkj->nik", self.frames, self.tied, self.frames)
+        return np.asarray(found * self.free[:, None, :])
 
     def join(self, values: np.ndarray) -> None:
         """Multiply by S: displacements from those relative to the lower nodes."""
-        self._add(self.lower, self.upper, values, 1.0)
+        self._turn(values, "nij,nj->ni")
+        self._add(self.lower, self.upper, values, self._coupling)
 
     def part(self, values: np.ndarray) -> None:
         """Multiply by the inverse of S."""
-        self._add(self.lower, self.upper, values, -1.0)
+        self._add(self.lower, self.upper, values, -self._coupling)
+        self._turn(values, "nji,nj->ni")
 
     def fold(self, values: np.ndarray) -> None:
         """Multiply by the transpose of S: forces on upper nodes act on the lower ones, too."""
-        self._add(self.upper, self.lower, values, 1.0)
+        self._add(self.upper, self.lower, values, np.swapaxes(self._coupling, 1, 2))
+        self._turn(values, "nji,nj->ni")
 
     def unfold(self, values: np.ndarray) -> None:
         """Multiply by the inverse of the transpose of S."""
-        self._add(self.upper, self.lower, values, -1.0)
+        self._turn(values, "nij,nj->ni")
+        self._add(self.upper, self.lower, values, -np.swapaxes(self._coupling, 1, 2))
 
-    def _add(self, here: Numbering, there: Numbering, values: np.ndarray, sign: float) -> None:
-        there.add_vectors(values, sign * self.free * here.gather_vectors(values[: 3 * here.owned]))
+    def upright(self, frames: FloatArray) -> FloatArray:
+        """Return the ``frames`` (m, 3, 3) of all candidates, which S has not turned already."""
+        found = frames.copy()
+        found[self.nodes] = np.eye(3)
+        return found
+
+    def _turn(self, values: np.ndarray, how: str) -> None:
+        own, here = values[: 3 * self.upper.owned].reshape(-1, 3), self.upper.is_owned
+        own[self.upper.local[here]] = np.einsum(how, self.frames[here], own[self.upper.local[here]])
+
+    def _add(self, here: Numbering, there: Numbering, values: np.ndarray, shares: FloatArray) -> None:
+        given = here.gather_vectors(values[: 3 * here.owned])
+        there.add_vectors(values, np.einsum("nij,nj->ni", shares, given))
 
     def fold_blocks(self, blocks: np.ndarray) -> None:
-        """Add the diagonal blocks (points, 9) of upper nodes to those of their lower ones."""
-        found = np.zeros((len(self.free), 9))
-        found[self.upper.is_owned] = blocks[self.upper.local[self.upper.is_owned]]
-        found = global_sum(self.upper.comm, found)
-        blocks[self.lower.local[self.lower.is_owned]] += found[self.lower.is_owned]
+        """Add the diagonal blocks (points, 9) of upper nodes to those of their lower ones, and turn them."""
+        found, here = np.zeros((len(self.free), 9)), self.upper.is_owned
+        found[here] = blocks[self.upper.local[here]]
+        turned = np.swapaxes(self.frames[here], 1, 2) @ found[here].reshape(-1, 3, 3) @ self.frames[here]
+        blocks[self.upper.local[here]] = turned.reshape(-1, 9)
+        found = global_sum(self.upper.comm, found).reshape(-1, 3, 3)
+        carried = np.swapaxes(self._coupling, 1, 2) @ found @ self._coupling
+        blocks[self.lower.local[self.lower.is_owned]] += carried[self.lower.is_owned].reshape(-1, 9)
 
     def matrix(self, like: PETSc.Mat) -> PETSc.Mat:
         """Return S with the sizes of a matrix ``like``; the caller destroys it."""
-        (first, last), here = like.getOwnershipRange(), self.upper.is_owned
-        of_upper = (3 * self.upper.local[here][:, None] + np.arange(3)).ravel()
-        beside = np.full(last - first, -1)
-        beside[of_upper] = (3 * self.lower.numbers[here][:, None] + np.arange(3)).ravel()
-        weights = np.zeros(last - first)
-        weights[of_upper] = self.free[here].ravel()
-        both = np.column_stack([np.arange(first, last), beside]), np.column_stack([np.ones(last - first), weights])
-        used = both[0] >= 0
-        rows = np.concatenate([[0], np.cumsum(used.sum(axis=1))]).astype(PETSc.IntType)
-        columns = both[0][used].astype(PETSc.IntType)
-        return PETSc.Mat().createAIJ(like.getSizes(), bsize=3, csr=(rows, columns, both[1][used]), comm=like.comm)
+        (first, last), (_, size), here = like.getOwnershipRange(), like.getSize(), self.upper.is_owned
+        of_upper = 3 * self.upper.local[here][:, None] + np.arange(3)
+        of_lower = 3 * self.lower.numbers[here][:, None] + np.arange(3)
+        others = np.setdiff1d(np.arange(last - first), of_upper)
+        turned = np.broadcast_to(of_upper[:, :, None], self.frames[here].shape)
+        below = np.broadcast_to(of_lower[:, None, :], turned.shape)
+        rows = [others, turned, turned]
+        columns = [first + others, first + np.swapaxes(turned, 1, 2), below]
+        values = [np.ones(len(others)), self.frames[here], self._coupling[here]]
+        parts = (np.concatenate([part.ravel() for part in each]) for each in (values, rows, columns))
+        weights, *places = parts
+        found = sp.coo_matrix((weights, places), shape=(last - first, size)).tocsr()
+        csr = found.indptr.astype(PETSc.IntType), found.indices.astype(PETSc.IntType), found.data
+        return PETSc.Mat().createAIJ(like.getSizes(), bsize=3, csr=csr, comm=like.comm)
 
     def react(self, into: FloatArray, forces: FloatArray) -> None:
         """Add to nodal forces what the upper nodes exert on the lower ones if the ``forces`` of all
@@ -145,13 +188,22 @@ class Pairs:
         moved[self.nodes] -= self.free * self.lower.gather_vectors(values)
 
 
-def pairs_of(space: Any, below: Int32Array, candidates: Candidates, upper: IntArray, is_free: FloatArray) -> Pairs:
+def pairs_of(
+    space: Any,
+    below: Int32Array,
+    candidates: Candidates,
+    upper: IntArray,
+    is_free: FloatArray,
+    normal: Callable[[Numbering, FloatArray], FloatArray],
+) -> Pairs:
     """Return the pairs of the ``upper`` candidates, by their numbers among all, and nodes of the facets ``below`` them.
 
-    ``is_free`` are 0 at prescribed dofs of the space, owned, else 1. Collective.
+    ``is_free`` are 0 at prescribed dofs of the space, owned, else 1; ``normal`` gives normals (n, 3) to upper nodes, of
+    which (n, 3) components are free. Collective.
 
     Raises:
-        SolveError: if a candidate has no node below it.
+        SolveError: if a candidate has no node below it, or if the support holds only components of upper nodes across
+            which no plane of symmetry is.
     """
     index_map, comm = space.dofmap.index_map, space.mesh.comm
     here = np.asarray(fem.locate_dofs_topological(space, space.mesh.topology.dim - 1, below), dtype=np.int32)
@@ -162,6 +214,9 @@ def pairs_of(space: Any, below: Int32Array, candidates: Candidates, upper: IntAr
     points = candidates.points[upper]
     away, nearest = cKDTree(places).query(points)
     if len(np.unique(nearest)) < len(upper) or away.max(initial=0.0) > _SAME * float(np.ptp(points, axis=0).max()):
-        raise SolveError("the surfaces of a loose layer and of the tissue below it have different nodes")
+        raise SolveError("the surfaces of loose tissue and of the tissue below it have different nodes")
     of_upper = Numbering(space, candidates.numbers[upper])
-    return Pairs(of_upper, Numbering(space, numbers[nearest]), of_upper.gather_vectors(is_free), upper)
+    free = of_upper.gather_vectors(is_free)
+    normals = normal(of_upper, free)
+    frames = turned_frames(normals, free.any(axis=1))
+    return Pairs(of_upper, Numbering(space, numbers[nearest]), free, upper, normals, frames, np.ones_like(free))

@@ -43,7 +43,8 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
         return PlacedTool(of_tool, complete, neighbours.followers, depth)
     beds = tool.beds
     if body.law.is_linear:
-        beds = tuple(bed.at_rest(body.part(n).candidates.points) for n, bed in enumerate(tool.beds, start=1))
+        places = [body.part(n).candidates.points for n, _ in enumerate(tool.beds, start=1)]
+        beds = tuple(bed.at_rest(at, body.normals_between) for bed, at in zip(beds, places, strict=True))
     return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool, depth))
 
 

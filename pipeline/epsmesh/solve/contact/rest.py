@@ -1,7 +1,7 @@
 """What a bed does to a body that rests on it, or that it holds as a jaw: reaction, area in contact, and balance."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import nan
 
@@ -23,6 +23,18 @@ from epsmesh.solve.response import whole_force
 
 # The square of the edge of an equilateral facet, in units of its area.
 _OF_FACET = 4 / 3**0.5
+
+
+class OnSurface(Candidates):
+    """Candidates with the areas of their facets in the surface itself."""
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """The areas of the facets (m²), (m)."""
+        around = self.points[self.facets[:, self.shape.boundary]]
+        middle = around.mean(axis=1, keepdims=True)
+        doubled = np.cross(around - middle, np.roll(around, -1, axis=1) - middle)
+        return np.asarray(np.linalg.norm(doubled.sum(axis=1), axis=1) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +59,23 @@ class Rest:
 
     @cached_property
     def _in_its_plane(self) -> "Rest":
-        """It with the axes of the bed, as those of a tool that presses along the last one."""
-        axes = self._axes
+        """It with the axes of the bed, as those of a tool that presses along the last one.
+
+        Between tissue areas are those of the surface itself, and the force along the last axis is the pressing one.
+        """
+        axes, forces = self._axes, self.touched.forces @ self._axes.T
         candidates = replace(self.candidates, points=self.candidates.points @ axes.T)
-        return replace(self, candidates=candidates, touched=replace(self.touched, forces=self.touched.forces @ axes.T))
+        if self.bed.is_tissue:
+            candidates = OnSurface(**{each.name: getattr(candidates, each.name) for each in fields(candidates)})
+            forces[:, -1] = -self.touched.pressed
+        return replace(self, candidates=candidates, touched=replace(self.touched, forces=forces))
 
     @property
     def _axes(self) -> FloatArray:
-        axes = turned_frames(np.array([self.bed.normal]), np.ones(1, dtype=bool))[0].T
+        normal = np.array(self.bed.normal)
+        if self.bed.is_tissue:  # the direction of most of the surface
+            normal = np.linalg.svd(self.touched.normal, full_matrices=False)[2][0]
+        axes = turned_frames(normal[None], np.ones(1, dtype=bool))[0].T
         axes[-1] *= -1.0
         return np.asarray(axes)
 
@@ -69,7 +90,8 @@ class Rest:
     def bar(self) -> float:
         """The relative bar on the area: by the size of elements, and by nodes that neither press nor are clear."""
         unsure = ~self.touched.active & (self.touched.gap < 0)
-        return self.area.bar + float(np.abs(self.candidates.weights[unsure]).sum()) / self.area.value
+        weights = self._in_its_plane.candidates.weights if self.bed.is_tissue else self.candidates.weights
+        return self.area.bar + float(np.abs(weights[unsure]).sum()) / self.area.value
 
     @property
     def unresolved(self) -> float:
@@ -107,6 +129,7 @@ class Rest:
         found = RestResult(
             force=(x, y, z),
             normal=self.bed.normal,
+            pressed=whole * self.pressed,
             area=whole * self.area.value,
             lifted=whole * max(self.whole_area - self.area.value, 0.0),
             slip=self.slip if self.bed.is_support else nan,
@@ -120,7 +143,9 @@ class Rest:
 
     @property
     def pressed(self) -> float:
-        """The force (N) on the modelled part along the normal."""
+        """The force (N) on the modelled part along the normal; between tissue, along that of each place."""
+        if self.bed.is_tissue:
+            return float(self.touched.pressed.sum())
         return float(self.force @ np.array(self.bed.normal))
 
     def force_bar(self, finer: "Rest", degree: int, at_edge: float, at_end: float) -> float:

@@ -51,7 +51,8 @@ def settle(
     extent = float(np.linalg.norm(np.ptp(body.places, axis=0)))
     moved = size / (min(body.law.lame_mu) * extent)
     pressed = max((float(body.on_terms @ np.array(bed.normal)) for bed in tool.beds), default=0.0)
-    if not body.elements.displacements.terms and pressed <= _PRESSES * size:
+    rests = any(any(bed.normal) for bed in tool.beds)  # not a region that lies loose somewhere
+    if rests and not body.elements.displacements.terms and pressed <= _PRESSES * size:
         does = "lift it off" if pressed < -_PRESSES * size else "do not press it on"
         raise LargeError(f"the body does not settle on its support: the loads {does}, and nothing else holds it")
     placed = placed_tool(body, tool, moved, away=extent)

@@ -94,7 +94,7 @@ class DeformedBody:
         self._from, self._is_current, self._energy = values.copy(), False, None
 
     def positions(self) -> FloatArray:
-        """Return the nodes' deformed positions (n, 3), in m; of a loose layer, as the tissue below sees them."""
+        """Return the nodes' deformed positions (n, 3), in m; of loose tissue, as the tissue below sees them."""
         return self.places + self._moved(self._now.array[: self._space.owned])
 
     def forces(self) -> FloatArray:
@@ -172,6 +172,11 @@ class DeformedBody:
         """The nodes' places (n, 3) at rest, in m."""
         return self._places
 
+    @property
+    def normals_between(self) -> FloatArray | None:
+        """The unit normals (n, 3) into loose tissue at its nodes; None without any."""
+        return None if self._pairs is None else self._pairs.normal
+
     # ---- results ----------------------------------------------------------------------------------------
 
     def residual(self) -> FloatArray:
@@ -218,7 +223,7 @@ class DeformedBody:
         self.state = self.elements.values
 
     def _moved(self, values: FloatArray) -> FloatArray:
-        """Return the displacements (n, 3) of the nodes, of a loose layer relative to the tissue below it."""
+        """Return the displacements (n, 3) of the nodes, of loose tissue relative to that below it."""
         found = self._numbering.gather_vectors(values)
         if self._pairs is not None:
             self._pairs.relative(found, values)

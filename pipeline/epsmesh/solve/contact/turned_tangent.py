@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.levels import Hierarchy, Surface
-from epsmesh.solve.contact.numbering import Numbering
+from epsmesh.solve.contact.numbering import Numbering, Pairs
 from epsmesh.solve.elements.assembled import AssembledTangent
 from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.displacement import DisplacementSolver
@@ -70,6 +70,14 @@ class TurnedTangent(ABC):
             SolveError: if the solver fails.
         """
 
+    def _frames_of(self, constraint: Constraint) -> FloatArray:
+        """Return the frames (n, 3, 3) of the candidates that the matrix S of loose tissue has not turned already."""
+        return constraint.frames if self._pairs is None else self._pairs.upright(constraint.frames)
+
+    def _joined(self, constraint: Constraint) -> Pairs | None:
+        """Return the pairs of loose tissue where a constraint holds."""
+        return None if self._pairs is None else self._pairs.holding(constraint.held[:, -1], constraint.firm)
+
     def _slots(self, constraint: Constraint) -> Int32Array:
         """Return the owned dofs that are held in the turned frames: of the constraint, and prescribed ones."""
         held = np.zeros(self._space.owned)
@@ -122,17 +130,17 @@ class FactorisedTangent(TurnedTangent):
         """Return the matrix of the frames, on displacements: an orthogonal one, or S times it where tissue is loose."""
         space, blocks = self._space, self._space.owned // 3
         frames = np.broadcast_to(np.eye(3), (blocks, 3, 3)).copy()
-        frames[self._numbering.local[self._here]] = constraint.frames[self._here]
+        frames[self._numbering.local[self._here]] = self._frames_of(constraint)[self._here]
         first = space.space.dofmap.index_map.local_range[0]
         columns = 3 * (first + np.arange(blocks))[:, None, None] + np.arange(3)
         columns = np.broadcast_to(columns, (blocks, 3, 3)).astype(PETSc.IntType).ravel()
         rows = np.arange(0, len(columns) + 1, 3, dtype=PETSc.IntType)
         size = (space.owned, space.size)
         found = PETSc.Mat().createAIJ((size, size), csr=(rows, columns, frames.ravel()), comm=space.comm)
-        if self._pairs is None:
+        if (pairs := self._joined(constraint)) is None:
             return found
         with ExitStack() as stack:
-            return keep(stack, self._pairs.matrix(found)).matMult(keep(stack, found))
+            return keep(stack, pairs.matrix(found)).matMult(keep(stack, found))
 
     def _turned(self, turn: PETSc.Mat, held: Int32Array, stack: ExitStack) -> PETSc.Mat:
         """Return the tangent in the turned frames, with the ``held`` slots eliminated."""
@@ -207,7 +215,8 @@ class IteratedTangent(TurnedTangent):
 
     def solve(self, constraint: Constraint, right: PETSc.Vec, change: PETSc.Vec, target: float) -> None:
         """Add the solution that is zero where the constraint holds."""
-        self._frames, self._held = constraint.frames[self._here], self._slots(constraint)
+        self._frames, self._held = self._frames_of(constraint)[self._here], self._slots(constraint)
+        self._now = self._joined(constraint)
         with ExitStack() as stack, self._body.state() as load, self._body.state() as found, explained():
             load.array[:] = right.array
             self._turn_back(load)
@@ -262,13 +271,13 @@ class IteratedTangent(TurnedTangent):
     def _turn(self, change: PETSc.Vec) -> None:
         """Change displacements in the turned frames to those along the axes."""
         self._rotate(change.array, "nij,nj->ni")
-        if self._pairs is not None:
-            self._pairs.join(change.array)
+        if self._now is not None:
+            self._now.join(change.array)
 
     def _turn_back(self, forces: PETSc.Vec) -> None:
         """Change forces along the axes to those in the turned frames."""
-        if self._pairs is not None:
-            self._pairs.fold(forces.array)
+        if self._now is not None:
+            self._now.fold(forces.array)
         self._rotate(forces.array, "nji,nj->ni")
 
     def _rotate(self, values: FloatArray, how: str) -> None:

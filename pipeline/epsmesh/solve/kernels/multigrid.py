@@ -5,6 +5,8 @@ diagonal blocks, as in PETSc; operators are matrix-free. The residual is scaled 
 precision does not overflow. Each rank smooths its own rows; ghosts are exchanged in single precision.
 """
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import isfinite
@@ -144,6 +146,12 @@ class Interpolation:
         coarse[:] = self.ghosts.folded(found, 3)
         coarse *= self.coarse_free[: len(coarse)]
 
+    def joined(self, coarse: Joined | None, fine: Joined | None) -> "Interpolation":
+        """Return the interpolation between other unknowns of both spaces; itself where they have none."""
+        if coarse is None or fine is None:
+            return self
+        return JoinedInterpolation(self.rows, self.coarse_free, self.fine_free, self.ghosts, (coarse, fine))
+
 
 @dataclass(frozen=True)
 class JoinedInterpolation(Interpolation):
@@ -211,6 +219,14 @@ class SmoothedLevel:
         self._invert(np.unique(self._held // 3), np.zeros(0, dtype=np.int32))
         held = np.union1d(self._operator.prescribed, dofs).astype(np.int32)
         self._held = held[held < self.size]
+        self._invert(np.unique(self._held // 3), self._held)
+
+    def replace_operator(self, operator: CellOperator) -> None:
+        """Smooth for another ``operator`` of the same size and about the same eigenvalues; collective."""
+        if operator is self._operator:
+            return
+        self._operator, self._blocks = operator, operator.diagonal()
+        call("invert_diagonal", self._rows, self._blocks, self._inverse)
         self._invert(np.unique(self._held // 3), self._held)
 
     def _invert(self, rows: Int32Array, held: Int32Array) -> None:
@@ -306,6 +322,13 @@ class Cycle:
         ]
         self.coarse = coarse
 
+    def join(self, operators: list[CellOperator], pairs: Sequence[Joined | None]) -> None:
+        """Take the ``operators`` of other unknowns from the second level on; ``pairs`` are those of all levels."""
+        for level, operator in zip(self._levels, operators, strict=True):
+            level.replace_operator(operator)
+        both = zip(self._interpolations, itertools.pairwise(pairs), strict=True)
+        self._interpolations = [between.joined(*ends) for between, ends in both]
+
     def above(self, levels: list[SmoothedLevel], interpolations: list[Interpolation]) -> "Cycle":
         """Return a cycle with more levels on top; it shares the present ones."""
         return Cycle([*self._levels, *levels], [*self._interpolations, *interpolations], self.coarse)
@@ -367,9 +390,7 @@ def interpolation(coarse: Side, fine: Side) -> Interpolation:
     rows: Rows = InCells(cell, position, below, weights)
     if (compat.degree(coarse.space), degree) == (1, 2):
         rows = OnEdges(below[cell[:, None], _ENDS[position]])
-    if coarse.pairs is not None and fine.pairs is not None:
-        return JoinedInterpolation(rows, free(coarse), free(fine), Ghosts(coarse.space), (coarse.pairs, fine.pairs))
-    return Interpolation(rows, free(coarse), free(fine), Ghosts(coarse.space))
+    return Interpolation(rows, free(coarse), free(fine), Ghosts(coarse.space)).joined(coarse.pairs, fine.pairs)
 
 
 def free(side: Side) -> Single:

@@ -192,12 +192,12 @@ def _moves_surface(scene: Scene) -> bool:
 
 def _contact_of_layer(scene: Scene) -> tuple[str, Any] | None:
     loose = scene.body.loose
-    return None if loose is None else (f"body.layer[{loose.number + 1}].contact", "unilateral")
+    return None if loose is None else (f"body.{loose.place}.contact", "unilateral")
 
 
 def _friction_of_layer(scene: Scene) -> tuple[str, Any] | None:
     loose = scene.body.loose
-    return None if loose is None else (f"body.layer[{loose.number + 1}].friction", loose.friction)
+    return None if loose is None else (f"body.{loose.place}.friction", loose.friction)
 
 
 def _has_term(scene: Scene, name: str) -> bool:
@@ -364,6 +364,9 @@ FEATURES: dict[str, Feature] = {
         "probe.contact", lambda s: s.body.resting is not None and not s.probe.is_unilateral, ("body",)
     ),
     "loose layer": Feature("body.layer", lambda s: s.body.loose is not None, where=_contact_of_layer),
+    "loose region": Feature(
+        "body.region", lambda s: s.body.loose is not None and not s.body.loose.is_level, where=_contact_of_layer
+    ),
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
     ),

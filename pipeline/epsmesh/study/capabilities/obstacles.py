@@ -118,7 +118,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "Omit the tension",
         "capsule of a hollow region": "{key}: capsules of hollow regions have no real-time model. Omit it",
         "support that lets go": "body.support: a real-time model has a fixed support. Give body.fixed",
-        "loose layer": "{key}: in a real-time model all layers are bonded. Omit it",
+        "loose layer": "{key}: in a real-time model all tissue is bonded. Omit it",
         "grasp": "probe.together: a real-time model has one tool. Omit the second [[probe]] table",
         "fibres": "{key}: fibres have a direction, and the half-space of a real-time model has none",
         "varying stiffness": "{key}: the half-space of a real-time model has one modulus. Give a value",

@@ -306,8 +306,11 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
     Refusal("loose layer", "grasp", "is not computed with two jaws: omit `together`"),
-    Refusal("loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
-    Refusal("loose layer", "region", "is parted in meshes of boxes and cylinders alone: use an inclusion, or omit it"),
+    Refusal(
+        "loose region",
+        "accuracy",
+        "has edges of contact anywhere on it, which meshes of an accuracy do not refine: give sizes",
+    ),
     Refusal("loose layer", "capsule on the surface", "would be held by the capsule around it: omit one of the two"),
     *(
         Refusal("loose layer that rubs", preloaded, f'must be 0 or "stick" with {what}')
