@@ -148,6 +148,7 @@ def test_a_layer_that_floats_says_so():
             "one layer or region only",
         ),
         ({"body": flap() | {"fixed": "none", "support": {"on": "bottom"}}}, "support that lets go"),
+        ({"body": flap(), "probe": BALL | {"at": ["20 mm", "0 mm", "-4 mm"]}}, "presses from the side"),
     ],
 )
 def test_what_is_not_computed_is_refused(changes, said):

@@ -118,12 +118,14 @@ def test_a_ball_that_slides_is_softer_and_its_pressure_has_no_resultant():
         assert max(across) < 1e-6 * found.largest["interface_force"]
 
 
+@pytest.mark.nightly
 def test_a_factorisation_finds_what_iterations_find():
     iterated, factorised = (one(body=ball(0.2), solve={"method": method}) for method in ("iterative", "direct"))
     assert factorised.force == pytest.approx(iterated.force, rel=1e-6)
     assert factorised.largest["lift_off_area"] == pytest.approx(iterated.largest["lift_off_area"], rel=1e-5)
 
 
+@pytest.mark.nightly
 def test_the_bars_cover_a_finer_mesh():
     sizes = ({"fine": "6 mm", "rim": "1 mm"}, {"fine": "2 mm", "rim": "0.4 mm"})
     coarse, fine = (one(body=ball(), mesh=mesh) for mesh in sizes)
@@ -133,6 +135,7 @@ def test_the_bars_cover_a_finer_mesh():
         assert abs(coarse.largest[name] - fine.largest[name]) < bars
 
 
+@pytest.mark.nightly
 def test_the_work_of_the_tool_is_the_energy():
     shares = np.linspace(0, 1, 5)[1:]
     depths = [f"{0.5 * share**2:.6g} mm" for share in shares]
@@ -157,6 +160,25 @@ def test_a_ball_beside_the_tool_floats_in_its_socket():
     (found,) = solve(**changes).values()
     assert '"ball" floats' in found.message
     assert "turn about" in found.message
+
+
+@pytest.mark.nightly
+def test_a_plane_between_labels_is_that_below_a_layer(tmp_path):
+    pytest.importorskip("nibabel")
+    labels = np.zeros((22, 22, 12), dtype=np.uint8)
+    labels[1:-1, 1:-1, 1:-1], labels[1:-1, 1:-1, 6:-1] = 1, 2
+    affine = np.diag([2.0, 2.0, 2.0, 1.0])
+    affine[:3, 3] = -21.0
+    path = write_nifti(tmp_path / "boxes.nii.gz", labels, affine)
+    upper = {"name": "upper", "young": "12 kPa", "poisson": 0.4, "contact": "unilateral", "friction": "stick"}
+    held, mesh = {"fixed": {"below": "-16 mm"}}, MESH | {"rim": "1.2 mm"}
+    layer = one(body=held | {"layer": [upper | {"thickness": "10 mm"}]}, mesh=mesh)
+    image = held | {"shape": "image", "file": str(path), "label": 1, "region": [upper | {"label": 2}]}
+    region = one(body=image, mesh=mesh, probe=TOOL | {"at": ["0 mm", "0 mm"]})
+    assert abs(region.force - layer.force) < region.force * region.force_error + layer.force * layer.force_error
+    for name in ("interface_force", "lift_off_area"):
+        bars = sum(each.largest[f"{name}_error"] for each in (layer, region))
+        assert abs(region.largest[name] - layer.largest[name]) < bars
 
 
 @pytest.mark.nightly

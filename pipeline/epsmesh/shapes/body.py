@@ -357,7 +357,7 @@ class Layered(Drawn):
 
     @property
     def loose(self) -> Loose | None:
-        """The layer that lies loose, or the region."""
+        """The layer that lies loose, or the region; not the lowest layer, which no tissue is below."""
         for number, (layer, _) in enumerate(zip(self.layer, self.interfaces, strict=False), start=1):
             if layer.contact != "bonded":
                 parts = tuple(range(1, number + 1))

@@ -367,6 +367,9 @@ FEATURES: dict[str, Feature] = {
     "loose region": Feature(
         "body.region", lambda s: s.body.loose is not None and not s.body.loose.is_level, where=_contact_of_layer
     ),
+    "level loose layer": Feature(
+        "body.layer", lambda s: s.body.loose is not None and s.body.loose.is_level, where=_contact_of_layer
+    ),
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
     ),

@@ -306,6 +306,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
     Refusal("loose layer", "grasp", "is not computed with two jaws: omit `together`"),
+    Refusal("level loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
     Refusal(
         "loose region",
         "accuracy",
