@@ -284,6 +284,15 @@ def _loose_region(study: Study) -> None:
     study["probe"].setdefault("contact", "unilateral")
 
 
+def _elastic_tool(study: Study) -> None:
+    """Let a ball, or the tool that there is, deform."""
+    probe = study["probe"]
+    if probe["shape"] == "disc" and not probe.get("edge"):
+        probe["shape"] = "sphere"
+    probe.setdefault("contact", "unilateral")
+    probe.update(young="50 kPa", poisson=0.3)
+
+
 def _grasp(study: Study) -> None:
     """Let an equal jaw close on the body from the opposite side; its sides hold it, or nothing else."""
     is_round = study["body"]["shape"] in ("box", "cylinder")
@@ -358,6 +367,7 @@ FEATURES = (
     Feature("support that lets go", "support", _support),
     Feature("loose layer", "support", _loose),
     Feature("loose region", "support", _loose_region),
+    Feature("tool that deforms", "tool", _elastic_tool),
     Feature("history", "history", _history),
     Feature("relaxation", "relaxation", _relaxation),
     Feature("relaxing regions", "relaxation", _relaxing_regions),

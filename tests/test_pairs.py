@@ -55,6 +55,7 @@ _OF_SCHEMA = (
     "is not computed over time",
     "is not computed along an insertion",
     "has no F_exact",
+    "is too large for a tool that deforms",
 )
 
 

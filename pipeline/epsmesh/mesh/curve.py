@@ -288,16 +288,17 @@ def _unfold(
     while are_any:
         bent = (middle != straight).any(axis=1)
         curved = np.flatnonzero(bent[of_cell].any(axis=1) & ~bad)
-        folded = curved[_folded(points[corners[curved]], middle[of_cell[curved]])]
+        nodes = np.concatenate([points[corners[curved]], middle[of_cell[curved]]], axis=1)
+        folded = curved[folded_cells(nodes)]
         bad[folded], chosen = True, np.zeros(len(middle), dtype=bool)
         chosen[of_cell[folded]] = True
         chosen, are_any = agree(chosen)
         middle[chosen] = milder[chosen]
 
 
-def _folded(corners: FloatArray, middle: FloatArray) -> BoolArray:
-    """Return a mask of cells whose quadratic map folds at a quadrature point of the stiffness."""
-    nodes = np.concatenate([corners, middle], axis=1)
+def folded_cells(nodes: FloatArray) -> BoolArray:
+    """Return a mask of cells, by their nodes (n, 10, 3), whose map folds at a quadrature point of the stiffness."""
+    corners = nodes[:, :4]
     straight = determinants(np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0))
     by_node = np.ascontiguousarray(nodes.transpose(1, 0, 2)).reshape(nodes.shape[1], -1)
     least = np.full(len(nodes), np.inf)

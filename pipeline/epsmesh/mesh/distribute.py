@@ -10,10 +10,10 @@ import numpy as np
 from mpi4py import MPI
 
 from epsmesh import compat
-from epsmesh.arrays import FloatArray, Int32Array, IntArray
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.parts import Part, renumbered
-from epsmesh.scene.model import MIRROR
+from epsmesh.scene.model import MIRROR, TOOL
 from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.stages import stage
 
@@ -77,6 +77,15 @@ class BodyMesh:
     def comm(self) -> MPI.Comm:
         """Communicator of the mesh."""
         return self.mesh.comm
+
+    @cached_property
+    def is_tissue(self) -> BoolArray:
+        """Mask of the owned cells, those of a tool that deforms excepted: of the last region; collective."""
+        found = np.ones(self.owned_cells, dtype=bool)
+        if TOOL not in self.facets or self.regions is None:
+            return found
+        last = self.comm.allreduce(int(self.regions.max(initial=0)), op=MPI.MAX)
+        return np.asarray(self.regions[: self.owned_cells] != last)
 
     @cached_property
     def mean_size(self) -> float:

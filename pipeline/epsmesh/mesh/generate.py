@@ -18,7 +18,22 @@ from epsmesh.mesh.reason import generate as mesh_model
 from epsmesh.mesh.reason import reason
 from epsmesh.mesh.regions import LocalSizes, longest_at_rim, region_sizes
 from epsmesh.mesh.size import Sizes, set_size_field
-from epsmesh.scene.model import CUT, FIXED, FREE, JAW, MIRROR, PROBE, SLIT, TISSUE, Scene, SceneError, build, rims
+from epsmesh.scene.model import (
+    CUT,
+    FIXED,
+    FLANK,
+    FREE,
+    JAW,
+    MIRROR,
+    MOUNT,
+    PROBE,
+    SLIT,
+    TISSUE,
+    Scene,
+    SceneError,
+    build,
+    rims,
+)
 from epsmesh.shapes.bodies.cad import FromCad
 from epsmesh.shapes.body import Drawn
 from epsmesh.shapes.probe import Probe
@@ -232,12 +247,12 @@ def _collect(scene: Scene, rim_curves: list[int], start: float) -> MeshArrays:
     cells = position[corners_of(3, [tag for _, tag in gmsh.model.getEntities(3)])]
     if not len(cells):
         raise MeshError("gmsh made no tetrahedra")
-    regions = _regions() if scene.body.regions else None
+    regions = _regions() if scene.body.regions or scene.probe.elastic else None
     facets = {FIXED: np.empty((0, 3), dtype=np.int64)}
     for dim, group in gmsh.model.getPhysicalGroups(2):
         name = gmsh.model.getPhysicalName(dim, group)
         facets[name] = position[corners_of(2, gmsh.model.getEntitiesForPhysicalGroup(dim, group))]
-    assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, JAW, *MIRROR.values()}
+    assert set(facets) <= {PROBE, FIXED, FREE, CUT, SLIT, JAW, MOUNT, FLANK, *MIRROR.values()}
     if not rim_curves:
         why = "gmsh leaves out the edge of the contact, which is too small beside the body: use a larger depth"
         raise GeometryError(why)

@@ -20,6 +20,7 @@ from epsmesh.mesh.reflect import NOWHERE, Place, reflect
 from epsmesh.mesh.size import EDGES_PER_RADIUS, Sizes
 from epsmesh.mesh.slit import open_slit
 from epsmesh.mesh.smooth import smoothed
+from epsmesh.mesh.tip import part_tool
 from epsmesh.plan.refinement import is_refined, refinements
 from epsmesh.plan.symmetry import mirror_planes
 from epsmesh.plan.thin import cause
@@ -66,6 +67,7 @@ def unrefined_arrays(case: Case, mirrors: tuple[str, ...], kept: "Kept | None" =
     arrays = open_slit(arrays, scene) if scene.has_inner_slit else arrays
     arrays = arrays if scene.straight else curve(arrays, scene)
     arrays = part_loose(arrays, loose) if (loose := case.body.loose) else arrays
+    arrays = part_tool(arrays, scene) if scene.probe.elastic else arrays
     arrays = _with_linear(arrays, case) if case.is_linear_beyond else arrays
     found = _named(reflect(arrays, _beyond(case, mirrors), _middle(case)), case)
     return replace(found, seconds=perf_counter() - start)

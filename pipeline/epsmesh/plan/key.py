@@ -79,6 +79,7 @@ def _scene_texts(case: Case, scaled: bool) -> tuple[tuple[str, ...], tuple[str, 
     tail = [_load_text(case.load, case.densities)] if case.load.acts or case.load.terms else []
     tail += [f"{place} {_capsule_text(capsule)}" for place, capsule in case.body.capsules.items()]
     tail += [f"support {text_of(rest)}"] if (rest := case.body.resting) else []
+    tail += [_tool_text(case.probe)] if case.probe.elastic else []
     tail += [f"jaw {text_of(jaw, _UNPHYSICAL)}", *_middle_text(case)] if (jaw := case.jaw) else []
     tail += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     tail += [f"imaged {_load_text(case.imaged, case.densities)}"] if case.imaged else []
@@ -124,8 +125,15 @@ def mesh_key(case: Case) -> str:
     footprint = text_of(case.probe, case.probe.not_drawn)
     refined = [f"refined {times}"] if (times := refinements(case)) else []
     parts = [_body_text(case.body), footprint, sizes, str(case.mesh.degree > 1), *refined, *_rim_text(case)]
+    parts += [f"height {tip.height!r}"] if (tip := case.probe.tip_shape) else []
     parts += [f"jaw {text_of(jaw, jaw.not_drawn)}", *_middle_text(case)] if (jaw := case.jaw) else []
     return digest("\n".join(parts))
+
+
+def _tool_text(probe: Probe) -> str:
+    """Return the keys of a tool that deforms, in canonical form; its section is that of the tool."""
+    tip = probe.tip_shape
+    return f"tool {probe.young!r} {probe.poisson!r} {tip and tip.height!r}"
 
 
 def _middle_text(case: Case) -> tuple[str, ...]:
@@ -147,6 +155,7 @@ def operator_key(case: Case) -> str:
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
     rests = [] if case.body.resting is None else [text_of(case.body.resting)]
     rests += [f"loose {loose.parts} {loose.friction}"] if (loose := case.body.loose) else []
+    rests += [f"height {tip.height!r}"] if (tip := case.probe.tip_shape) else []
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
     rests += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]

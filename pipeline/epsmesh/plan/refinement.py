@@ -42,9 +42,9 @@ def refinements(case: Case) -> int:
     """Return how many times the mesh of a case is refined: 0, 1 or 2.
 
     Points of a refined mesh are placed on surfaces that a formula gives. Bodies from files are therefore not refined,
-    nor are curved bodies cut at ε, because two such surfaces meet there, nor slits, nor loose layers. Nor are
-    inclusions: some of their elements would fold. Layered bodies are refined once: gmsh's elements would be too large
-    for a layer. For a film they are so at once: bodies with one are not refined.
+    nor are curved bodies cut at ε, because two such surfaces meet there, nor slits, nor loose layers, nor tools that
+    deform. Nor are inclusions: some of their elements would fold. Layered bodies are refined once: gmsh's elements
+    would be too large for a layer. For a film they are so at once: bodies with one are not refined.
     """
     return _refinements(_Scene(case.body, case.probe, case.mesh, case)) if case.mesh.degree > 1 else 0
 
@@ -65,7 +65,10 @@ def cells(case: Case) -> float:
 @lru_cache(_MANY)
 def _refinements(scene: _Scene) -> int:
     body, case = scene.body, scene.case
-    if not isinstance(body, Drawn) or body.embedded or scene.probe.slit is not None or scene.probe.crack or body.loose:
+    probe = scene.probe
+    if not isinstance(body, Drawn) or body.embedded or probe.slit is not None or probe.crack:
+        return 0
+    if body.loose or probe.elastic:
         return 0
     if case.column < inf and any(surface.is_curved for group in body.surfaces().values() for surface in group):
         return 0

@@ -61,6 +61,7 @@ _OF_REST = tuple(
     f"{name}{bar}" for name in ("support_force", "lift_off_area", "support_slip") for bar in ("", "_error")
 )
 _OF_LOOSE = ("interface_force", "interface_force_error", "interface_area", *_OF_REST[2:4])
+_OF_TOOL = ("tool_shortening", "tool_shortening_error")
 _OF_JAW = ("jaw_force", "jaw_force_error", "jaw_contact_area", "jaw_contact_area_error")
 _OF_PULL = tuple(
     f"{name}{bar}"
@@ -79,7 +80,7 @@ _ENERGIES_OF_PULL = ("pull_work", "friction_work", "pull_energy")
 _OF_LOADS = ("load_force", "load_force_error", "load_energy", "sag", "load_force_vector")
 _OF_FRICTION = tuple(f"{name}{bar}" for name in ("slip_area", "friction_force", "torque") for bar in ("", "_error"))
 # Numbers that a record has by their names.
-_FURTHER = (*LARGEST, *_OF_SHAPE, *_OF_REST, *_OF_LOOSE, *_OF_PULL, *_ENERGIES_OF_PULL)
+_FURTHER = (*LARGEST, *_OF_SHAPE, *_OF_REST, *_OF_LOOSE, *_OF_TOOL, *_OF_PULL, *_ENERGIES_OF_PULL)
 _PARTS = (
     _Part(("force", "force_error", "energy", "balance", *_COSTS, "machine_load", "memory")),
     _Part(
@@ -99,6 +100,7 @@ _PARTS = (
     _Part(_OF_REST, of=lambda case: case.body.resting is not None),
     _Part(_OF_LOOSE, of=lambda case: case.body.loose is not None),
     _Part(("interface_force_vector",), ("component",), of=lambda case: case.body.loose is not None),
+    _Part(_OF_TOOL, of=lambda case: case.probe.elastic is not None),
     _Part(_OF_JAW, of=lambda case: case.jaw is not None),
     _Part(("jaw_torque", "jaw_torque_error"), of=lambda case: case.jaw is not None and case.way.rubs),
     _Part(("jaw_force_vector",), ("component",), of=lambda case: case.jaw is not None),

@@ -71,10 +71,10 @@ def variation_of(case: Case) -> Variation | None:
     """Return the fields of the regions of the mesh of ``case``; None if all moduli are constant."""
     if not case.varies:
         return None
-    keys = ("material", *(f"body.{place}" for place in case.body.places))
+    keys = ("material", *(f"body.{place}" for place in case.body.places), "probe")
     fields = tuple(
         None if tissue.varying is None else TissueField(tissue.varying, f"{key}.young")
-        for tissue, key in zip(case.tissues, keys, strict=True)
+        for tissue, key in zip(case.tissues, keys, strict=False)
     )
     turn = case.frame.turn
     return Variation(fields, None if turn is None else tuple(map(tuple, turn.tolist())))

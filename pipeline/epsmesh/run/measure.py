@@ -27,7 +27,7 @@ from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.grasp import MIDDLE
-from epsmesh.solve.contact_result import ContactResult, PullResult
+from epsmesh.solve.contact_result import ContactResult, PullResult, RestResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import is_fine, is_graded, unresolved
 from epsmesh.solve.history import History
@@ -147,7 +147,16 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
 
 def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
     """Return what a record has of what touches the body besides the tool; ``bar`` is the relative one on the force."""
-    rest = None if solution.contact is None else solution.contact.rest
+    contact, rest = solution.contact, None if solution.contact is None else solution.contact.rest
+    if case.probe.elastic and contact is not None:
+        of_tool = {"tool_shortening": contact.shortening, "tool_shortening_error": contact.shortening_bar}
+    else:
+        of_tool = {}
+    return of_tool | _of_second(case, solution, rest, bar)
+
+
+def _of_second(case: Case, solution: Solution, rest: RestResult | None, bar: float) -> dict[str, float]:
+    """Return the same of a second jaw, a support, or the tissue below a loose layer."""
     if case.jaw:
         return _of_jaw(case, solution.contact, bar)
     if case.body.loose is None or rest is None:

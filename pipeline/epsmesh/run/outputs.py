@@ -86,7 +86,7 @@ def _of_fields(output: Output, case: Case, state: State | None, finer: State | N
     if output.at is not None:
         return at_point(output.of, np.array(output.at), state, finer, clear)
     body = state.body
-    chosen = np.ones(body.owned_cells, bool)
+    chosen = body.is_tissue
     if output.region != WHOLE and body.regions is not None:
         names = [OWN, *(region.name for region in case.body.regions)]
         # Beyond ε, the linear part of each region has a number of its own.

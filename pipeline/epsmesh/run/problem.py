@@ -134,6 +134,7 @@ def conditions_of(case: Case) -> Conditions:
         terms=terms_of(case),
         variation=variation_of(case),
         beds=beds_on(case),
+        deforms=case.probe.elastic is not None,
     )
 
 

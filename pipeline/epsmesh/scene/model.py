@@ -19,6 +19,7 @@ from epsmesh.scene.imprint import cut_out
 from epsmesh.scene.regions import draw_inclusions, regions_of, remove_beyond
 from epsmesh.scene.slit import draw_plane, draw_slit, mirror_of, sample_curve, singular_curves
 from epsmesh.scene.tessellate import NotASolid, read_solid
+from epsmesh.scene.tip import draw_tip, is_mounted, is_of_tool
 from epsmesh.shapes.bodies.cad import FromCad
 from epsmesh.shapes.body import Body, Drawn
 from epsmesh.shapes.contact import is_flat, is_level
@@ -34,6 +35,8 @@ from epsmesh.shapes.surface import Surface, Tube
 TISSUE, PROBE, FIXED, FREE, CUT = "tissue", "probe", "fixed", "free", "cut"
 JAW = "jaw"  # what a second jaw may touch
 LOOSE, BELOW = "loose", "below"  # where loose tissue touches other tissue, and the other side
+# Of a tool that deforms: the face that may touch tissue, what is free, and the end that its mount holds.
+TOOL, FLANK, MOUNT = "tool", "flank", "mount"
 SLIT = "slit"  # the part of a slit's faces that the blade does not touch
 # Those of planes of symmetry, by the names of these: of x, of y, and between two jaws.
 MIRROR = {"x": "mirror_x", "y": "mirror_y", MIDDLE: "mirror_middle"}
@@ -148,6 +151,8 @@ def build(scene: Scene) -> list[int]:
     if scene.is_cut:
         volumes, _ = occ.intersect(volumes, [(3, _add_column(scene))])
         volumes = _touched(scene, volumes)
+    if (tip := scene.probe.tip_shape) is not None:
+        volumes.append(draw_tip(tip, scene.frame, scene.units))
     if scene.mirrors:
         volumes, _ = occ.intersect(volumes, [(3, _add_positive_side(scene))])
     printed, beside = _add_contact(scene, volumes)
@@ -178,7 +183,7 @@ def build(scene: Scene) -> list[int]:
     if not footprint or (scene.jaw is not None and not jaw):
         raise SceneError("no part of the probe's footprint is on the body")
     inclusions = children[len(volumes) + len(printed) + len(heights) : first]
-    regions = regions_of(scene.body, inclusions, scene.scale)
+    regions = regions_of(scene.body, inclusions, scene.scale, is_of_tool(scene.probe, scene.frame))
     if slit := scene.probe.slit:
         count = len(slit.free(0.0))
         free = [tag for part in children[first : first + count] for _, tag in part if tag in inside]
@@ -303,7 +308,7 @@ def _name_groups(
     model = gmsh.model
     volumes = model.getEntities(3)
     groups: dict[str, list[int]] = {PROBE: list(footprint), FIXED: [], FREE: [], CUT: [], SLIT: list(slit)}
-    groups |= {JAW: list(jaw)}
+    groups |= {JAW: list(jaw), MOUNT: [], FLANK: []}
     groups |= {MIRROR[plane]: [] for plane in scene.mirrors}
     tests = _face_tests(scene)
     for _, tag in model.getBoundary(volumes, combined=True, oriented=False):
@@ -352,4 +357,5 @@ def _face_tests(scene: Scene) -> list[tuple[str, Callable[[Any], bool]]]:
 
     planes = ((MIRROR[plane], *scene.plane(plane)) for plane in scene.mirrors)
     mirrors = [(name, partial(on_mirror, axis=axis, at=at)) for name, axis, at in planes]
-    return [*mirrors, (CUT, on_cut), (FIXED, is_held)]
+    tool = (MOUNT, is_mounted(scene.probe, scene.frame, close)), (FLANK, is_of_tool(scene.probe, scene.frame))
+    return [*mirrors, *tool, (CUT, on_cut), (FIXED, is_held)]

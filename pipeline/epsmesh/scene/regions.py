@@ -1,9 +1,11 @@
 """Regions of a body in the geometry kernel: inclusions are drawn, and volumes assigned to materials."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import gmsh
+import numpy as np
 
+from epsmesh.arrays import FloatArray
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import Units
 from epsmesh.shapes.regions import Inclusion
@@ -31,10 +33,13 @@ def remove_beyond(kept: Collection[int]) -> None:
         gmsh.model.occ.synchronize()
 
 
-def regions_of(body: Body, inclusions: Sequence[Sequence[Tag]], scale: float) -> dict[int, list[int]]:
+def regions_of(
+    body: Body, inclusions: Sequence[Sequence[Tag]], scale: float, is_of_tool: Callable[[FloatArray], bool]
+) -> dict[int, list[int]]:
     """Return the tags of the volumes of each region, by its number; ``scale`` is the model's unit in metres.
 
-    ``inclusions`` are the pieces of each inclusion; other volumes are assigned by their height.
+    ``inclusions`` are the pieces of each inclusion; other volumes are assigned by their height. The last number is that
+    of a tool that deforms, by its centre (3), m.
     """
     numbers: dict[Tag, int] = {}
     first = len(body.regions) - len(body.embedded) + 1
@@ -43,6 +48,8 @@ def regions_of(body: Body, inclusions: Sequence[Sequence[Tag]], scale: float) ->
     found: dict[int, list[int]] = {}
     for volume in gmsh.model.getEntities(3):
         number = numbers[volume] if volume in numbers else _layer_of(body, volume, scale)
+        if is_of_tool(scale * np.array(gmsh.model.occ.getCenterOfMass(*volume))):
+            number = 1 + len(body.regions)
         found.setdefault(number, []).append(volume[1])
     return dict(sorted(found.items()))
 

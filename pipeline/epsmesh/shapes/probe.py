@@ -12,6 +12,7 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.closed import FarSizes
 from epsmesh.shapes.crack import Crack
+from epsmesh.shapes.deformable import Deformable
 from epsmesh.shapes.footprint import Footprint
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.friction import STICK, Friction
@@ -20,6 +21,7 @@ from epsmesh.shapes.pulled import Pulled
 from epsmesh.shapes.revolved import Revolved
 from epsmesh.shapes.section import Problems, Words, in_mm
 from epsmesh.shapes.slit import Slit
+from epsmesh.shapes.tip import Tip
 from epsmesh.units import Coordinate, Force, Length
 
 # Candidate planes of symmetry, by the coordinate that is zero on them, and their normals.
@@ -38,7 +40,7 @@ def _two_or_three(at: tuple[float, ...]) -> tuple[float, ...]:
     return at
 
 
-class Probe(Pulled, Footprint):
+class Probe(Deformable, Pulled, Footprint):
     """A tool: its place, its movement, and its shape.
 
     The footprint is the part of the surface that moves with the tool. With unknown contact area (``is_unilateral``) it
@@ -238,6 +240,11 @@ class Probe(Pulled, Footprint):
         return None
 
     @property
+    def tip_shape(self) -> Tip | None:
+        """The part that deforms; None of a rigid tool."""
+        return None
+
+    @property
     def hertz_radius(self) -> float | None:
         """Radius (m) of H. Hertz's paraboloid, which it is at small depths; None for any other tool."""
         return None
@@ -358,6 +365,22 @@ class Probe(Pulled, Footprint):
                 f"is {self.deepest / self.half_width:.0%} of the tool's half width {in_mm(self.half_width)}. Above "
                 f"{LINEAR:.0%}, linear elasticity is an extrapolation ({proportional}); at {LINEAR:.0%}, F of a "
                 "neo-Hookean body is about 1 % smaller",
+            )
+
+    def check_tip(self, problems: Problems) -> None:
+        """Report keys of a tool that deforms that others need, or exclude, and a mount that is next to the contact."""
+        self.check_keys(problems)
+        if (tip := self.tip_shape) is None:
+            return
+        if (least := tip.least_height) > tip.height:
+            told = f"puts the mount next to the contact: must be at least {in_mm(least)}, or use a smaller depth"
+            problems.error("probe.height", in_mm(tip.height), told)
+        elif self.deepest > LINEAR * tip.height and self.force is None:
+            problems.warn(
+                "probe.depth",
+                in_mm(self.deepest),
+                f"is {self.deepest / tip.height:.0%} of the height {in_mm(tip.height)} of the tool that deforms. Above "
+                f"{LINEAR:.0%}, linear elasticity is an extrapolation",
             )
 
     def check(self, problems: Problems) -> None:

@@ -126,7 +126,7 @@ class CellValues:
 
     def largest(self, law: MaterialLaw, front: Front | None = None) -> dict[str, Any]:
         """Return the maximum of each of ``CELL_MAXIMA`` over cells clear of singular edges, by name; collective."""
-        cells, clear = self.cells(law), self._clear_of(front)
+        cells, clear = self.cells(law), self._clear_of(front) & self._body.is_tissue
         found = [value(cells)[clear].max(initial=-np.inf) for value in CELL_MAXIMA.values()]
         # NaN on one rank must give NaN on all ranks; MPI's MAX does not promise that.
         largest = np.max(self._body.comm.allgather(found), axis=0)

@@ -57,7 +57,8 @@ class Conditions:
     faces of the slit. Without bond it prescribes their opening only, and its driving force acts at its ``tip``.
     ``terms`` act on the body besides its law, whose stiffness has a ``variation``, if it varies within regions. A
     support that is ``released`` fixes nothing: the active set does. ``beds`` are the groups of facets that
-    contacts besides the tool's may touch: that of a released support, or of a jaw.
+    contacts besides the tool's may touch: that of a released support, or of a jaw. A tool that ``deforms`` is a part of
+    the mesh, fixed at its mount.
     """
 
     bonded: bool = True
@@ -67,11 +68,13 @@ class Conditions:
     terms: tuple[AddedTerm, ...] = ()
     variation: Variation | None = None
     beds: tuple[str, ...] = ()
+    deforms: bool = False
 
     @property
     def without_footprint(self) -> "Conditions":
         """The same without a tool."""
-        return replace(WITHOUT_FOOTPRINT, terms=self.terms, variation=self.variation, beds=self.beds)
+        kept = {name: getattr(self, name) for name in ("terms", "variation", "beds", "deforms")}
+        return replace(WITHOUT_FOOTPRINT, **kept)
 
     @property
     def released(self) -> bool:

@@ -24,7 +24,7 @@ class ContactResult:
     the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
     bar by the size of elements there. ``rest`` is what a support that lets go, or a second jaw, does. ``shift`` (m) is
     how far loads move the place of contact across the axis, NaN where the tool follows. ``pull`` is what jaws do that
-    are pulled.
+    are pulled. ``shortening`` (m) is how far a tool that deforms gives way on its axis, with a 95 % bar (m).
     """
 
     area: float
@@ -44,6 +44,8 @@ class ContactResult:
     shift: float = nan
     rest: "RestResult | None" = None
     pull: "PullResult | None" = None
+    shortening: float = nan
+    shortening_bar: float = nan
 
     @property
     def radius(self) -> float:

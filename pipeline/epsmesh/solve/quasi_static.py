@@ -317,6 +317,7 @@ def _with_bars(
     if (rest := contact.rest) is not None:
         area, force = (finer.area_bar, float(relative[0])) if is_halved else (finer.rest_bar, finer.rest_force_bar)
         found = replace(found, rest=replace(rest, bar=area, force_bar=force, slip_bar=finer.rest_slip_bar))
+    found = replace(found, shortening_bar=finer.shortening_bar)
     if finer.pull is not None:
         found = replace(found, pull=finer.pull)
     if contact.rubbing is None or finer.relative is None:

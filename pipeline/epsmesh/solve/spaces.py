@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from epsmesh import compat
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.mesh.distribute import BodyMesh
-from epsmesh.scene.model import FIXED, PROBE
+from epsmesh.scene.model import FIXED, MOUNT, PROBE
 from epsmesh.solve import SolveError
 from epsmesh.solve.coarse_levels import CoarseSpace, coarse_space
 from epsmesh.solve.compiled import assemble, fill, vector_space
@@ -44,8 +44,9 @@ class ElasticSpace:
     """Displacements of one degree on a mesh: prescribed dofs, forms, and operators.
 
     ``prescribed`` are local dofs (unrolled, owned and ghosts). Arrays named ``…_owned`` index owned dofs;
-    ``probe_owned``, ``fixed_owned`` and ``resting_owned``, of beds, index owned blocks of three dofs; ``bearing_owned``
-    are those whose reactions along z balance the tool's: of the support, and of the plane between two jaws.
+    ``probe_owned``, ``fixed_owned``, ``resting_owned``, of beds, and ``mount_owned``, of a tool that deforms, index
+    owned blocks of three dofs; ``bearing_owned`` are those whose reactions along z balance the tool's: of the support,
+    and of the plane between two jaws.
     ``owned`` and ``size`` count the dofs of this rank, and of all ranks. ``terms`` are those of the conditions,
     ``factors`` those of the energy, or None. ``space`` and ``dirichlet`` are dolfinx objects.
     """
@@ -75,11 +76,13 @@ class ElasticSpace:
         mirrors = list(zip(body.planes.values(), _planes(space, body), strict=True))
         single = [(3 * probe + axis, axis) for axis in conditions.components]
         single += [(3 * plane + axis, axis) for axis, plane in mirrors]
-        self._probe, self._fixed, self._single, self._sides = probe, fixed, single, self._sides_of(probe)
-        self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * fixed + c for c in range(3))]))
+        mount = _points(space, body, MOUNT) if conditions.deforms else _NO_DOFS
+        held = np.union1d(fixed, mount)
+        self._probe, self._fixed, self._single, self._sides = probe, held, single, self._sides_of(probe)
+        self.prescribed = np.unique(np.concatenate([*(d for d, _ in single), *(3 * held + c for c in range(3))]))
         self.prescribed_owned = self.prescribed[self.prescribed < self.owned]
-        of_blocks = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed, resting))
-        self.probe_owned, self.fixed_owned, self.resting_owned = of_blocks
+        of_blocks = (dofs[dofs < index_map.size_local] for dofs in (probe, fixed, resting, mount))
+        self.probe_owned, self.fixed_owned, self.resting_owned, self.mount_owned = of_blocks
         middle = mirrors[-1][1] if body.is_halved else _NO_DOFS
         self.bearing_owned = np.union1d(self.fixed_owned, middle[middle < index_map.size_local])
         self.forms = ElasticForms(space, body.regions, cell_kernel, self.factors)

@@ -6,6 +6,8 @@ from epsmesh.quantities import write
 
 # Keys that both body and probe have, or a variable of the dataset: their dimension says whose it is.
 _AMBIGUOUS = ("radius", "shape", "accuracy", "axis", "force")
+# Keys of a section that another has, too, whose dimension has the name alone.
+_LIKE_THAT = {"body": ("axes",), "probe": ("young", "poisson", "height")}
 # Tables with keys that have the names of others.
 _LIKE_OTHERS = ("spread",)
 
@@ -30,7 +32,7 @@ class Axis:
             return self.section
         if own := "_".join(filter(None, (self.owner, self._table))):
             return f"{own}_{self.key}"
-        is_ambiguous = self.key in _AMBIGUOUS or (self.section, self.key) == ("body", "axes")
+        is_ambiguous = self.key in _AMBIGUOUS or self.key in _LIKE_THAT.get(self.section, ())
         return f"{self.section}_{self.key}" if is_ambiguous else self.key
 
     @property

@@ -8,6 +8,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from epsmesh.shapes.body import Body
 from epsmesh.shapes.contact import curvature_below, is_level
+from epsmesh.shapes.deformable import TOOL
 from epsmesh.shapes.frame import Frame, Vector
 from epsmesh.shapes.grasp import opposite
 from epsmesh.shapes.probe import Probe
@@ -173,9 +174,11 @@ class Case:
     def tissues(self) -> tuple[Tissue, ...]:
         """What the regions of the body are made of, in the order of their numbers in meshes.
 
-        Where layers fill the body, no cell has number 0; it is then as the first layer.
+        Where layers fill the body, no cell has number 0; it is then as the first layer. The last one is that of a tool
+        that deforms.
         """
-        return self.material, *self.body.regions
+        tool = self.probe.elastic
+        return self.material, *self.body.regions, *(() if tool is None else (tool,))
 
     @property
     @of_scene
@@ -186,7 +189,7 @@ class Case:
     @property
     def region_names(self) -> tuple[str, ...]:
         """Names of the regions of the mesh, in the order of their numbers: those of tissues, then of linear parts."""
-        names = self.body.region_names
+        names = (*self.body.region_names, *(() if self.probe.elastic is None else (TOOL,)))
         return (*names, *(f"{name}, linear" for name in names)) if self.is_linear_beyond else names
 
     @property
@@ -242,7 +245,8 @@ class Case:
     @of_scene
     def is_even(self) -> bool:
         """Whether a body of one constant material is pressed straight down on a plane face."""
-        return not self.varies and not self.body.pieces and self.probe.slit is None and is_level(self.body, self.frame)
+        is_one = not (self.varies or self.body.pieces or self.probe.elastic)
+        return is_one and self.probe.slit is None and is_level(self.body, self.frame)
 
     @property
     @of_scene

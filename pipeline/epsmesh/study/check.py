@@ -61,6 +61,7 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     if linear:
         problems.each(warn_of_depth, probe=probes)
     problems.each(lambda probe, _: probe.check(problems), probe=probes)
+    problems.each(lambda probe, _: probe.check_tip(problems), probe=probes)
     problems.each(lambda probe, _: probe.jaw and probe.jaw.check(problems), probe=probes)
     problems.each(check_history, probe=probes)
     problems.each(check_sizes, mesh=meshes)
@@ -78,7 +79,8 @@ def check_sense(sections: dict[str, tuple[Section, ...]], axes: tuple[Axis, ...]
     check_laws(bodies, materials, problems)
     problems.each(check_moduli, body=bodies, material=materials)
     problems.each(check_extent, body=bodies)
-    problems.each(check_locking, body=bodies, material=materials, mesh=meshes)
+    tools = tuple({probe.elastic: probe for probe in probes}.values())
+    problems.each(check_locking, body=bodies, material=materials, mesh=meshes, probe=tools)
     check_reference(meshes, axes, placed, problems)
     _check_times(probes, axes, problems)
     for planning in cast(Sequence[Planning], sections["plan"]):

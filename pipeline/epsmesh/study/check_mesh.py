@@ -169,9 +169,9 @@ def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
     body.hold.check(body.heights, mesh.fine, problems)
 
 
-def check_locking(body: Body, material: Material, mesh: Mesh, problems: Problems) -> None:
-    """Check elements against Poisson's ratios of all the materials of a body."""
-    tissues = dict(tissues_of(body, material))
+def check_locking(body: Body, material: Material, mesh: Mesh, probe: Probe, problems: Problems) -> None:
+    """Check elements against Poisson's ratios of all the materials of a body, and of a tool that deforms."""
+    tissues = dict(tissues_of(body, material)) | ({"probe": tool} if (tool := probe.elastic) else {})
     poissons = {f"{key}.poisson": tissue.poisson for key, tissue in tissues.items()}
     is_large = body.main(material).is_large
     if mesh.element_for(max(poissons.values()), is_large=is_large) == "mixed":

@@ -9,11 +9,14 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.contour import Contour
 from epsmesh.shapes.distance import Distance, revolved
-from epsmesh.shapes.indenter import Indenter
+from epsmesh.shapes.indenter import BAND, Indenter
 from epsmesh.shapes.insertion import Needle
+from epsmesh.shapes.parabola import Parabola
 from epsmesh.shapes.probe import ON_EDGE, Probe
 from epsmesh.shapes.probes.disc import Disc
 from epsmesh.shapes.revolved import Revolved
+from epsmesh.shapes.section import Problems, in_mm
+from epsmesh.shapes.tip import STEEPEST, Tip
 from epsmesh.units import Length
 
 # Rings of a tip.
@@ -35,7 +38,15 @@ class InRing(Indenter):
     @property
     def footprint(self) -> Probe:
         """The disc that contains all that it may touch."""
-        return self.touching(min(self.candidate_width, self.limit))
+        return self.touching(min(self.candidate_width, self._widest))
+
+    @property
+    def _widest(self) -> float:
+        """The largest radius (m) that it may touch: where a tool deforms, none at which its side is nearly upright."""
+        section = self.section
+        if self.elastic is None or section.angle:
+            return self.limit
+        return min(section.flat + STEEPEST * section.tip, self.limit)
 
     @property
     def expected_radius(self) -> float:
@@ -65,6 +76,24 @@ class RoundIndenter(InRing, Needle):
     def tip_heights(self) -> FloatArray:
         """Heights (n) in m of the tip's surface, at equal steps of the radius from the axis to the shaft."""
         return self.section.height(self.limit * np.linspace(0.0, 1.0, _RINGS + 1))
+
+    @property
+    def tip_shape(self) -> Tip | None:
+        """The part that deforms, where the section is of straight lines and circles."""
+        if self.elastic is None or isinstance(self.section, Parabola):
+            return None
+        height = self.limit if self.height is None else self.height
+        return Tip(self.section, self.limit, height, self.footprint.half_width)
+
+    def check_tip(self, problems: Problems) -> None:
+        """Report the keys of a tool that deforms, and a depth at which its side is steep where contact ends."""
+        super().check_tip(problems)
+        flat, (_, widest) = self.section.flat, self.contact_widths
+        if self.tip_shape and flat + BAND * (widest - flat) > self.footprint.half_width and self.force is None:
+            told = (
+                "is too large for a tool that deforms: its side is steep where contact ends. Omit `young`, or use less"
+            )
+            problems.error("probe.depth", in_mm(self.depths[1]), told)
 
     @property
     def kinks(self) -> tuple[float, ...]:

@@ -78,7 +78,8 @@ class Friction:
         parts = [body.part(number) for number in range(len(coefficients))]
         for part in parts:
             width = float(np.median(part.candidates.widths[part.candidates.widths > 0]))
-            penalties.append(float(np.mean(part.candidates.of_facets(body.law.plane_moduli))) * width)
+            modulus = part.candidates.of_facets(body.moduli(len(penalties)))
+            penalties.append(float(np.mean(modulus)) * width)
         coefficient: float | FloatArray = tool.friction
         advance, penalty = np.array([0.0, 0.0, -1.0]), penalties[TOOL] + body.stiffness_of_terms()
         if tool.beds:

@@ -109,6 +109,11 @@ class LargeContactSolution:
         return self.surface_contact.force
 
     @cached_property
+    def shortening(self) -> float:
+        """How far (m) a tool that deforms gives way on its axis; NaN of a rigid one."""
+        return self.body.shortening(self.tool.foot)
+
+    @cached_property
     def rests(self) -> tuple[Rest, ...]:
         """What the beds do to the modelled part."""
         return rests_of(self.body, self.tool.beds, self.touched)
@@ -127,6 +132,7 @@ class LargeContactSolution:
         stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
         found = self.surface_contact.result(self.sagged.sag, stored)
         found = replace(found, rest=self.rests[0].result()) if self.rests else found
+        found = replace(found, shortening=self.shortening)
         if self.beside is None or not self.beside.pulls:
             return found
         return replace(found, pull=self.beside.pulls[-1].result(self.body.elements.body))
@@ -146,6 +152,8 @@ class LargeContactSolution:
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
         balance = float(np.linalg.norm(force_left(self.body, self.tool.beds, self.touched))) / self.force
+        if self.body.elements.displacements.conditions.deforms:
+            balance = max(balance, abs(self.body.mount_force / self.force - 1))
         check_balance(balance)
         on_probe = self.surface_contact.touched.forces.sum(axis=0)[None] / self.depth
         return reaction(movement, -on_probe[:, 2:], on_probe, self.body.elements.body.mirrored, balance)
@@ -166,6 +174,8 @@ class LargeContactSolution:
             found = smooth.hierarchical_estimate(columns, movement, stack, keep=keep)
             self.body.state = state
             found = half_the_steps(found, self.surface_contact, smooth.force)
+            more = found.friction_bar * self.shortening
+            found = replace(found, shortening_bar=found.shortening_bar + more)
             if self.rests and self.rests[0].bed.is_support:
                 return self.rests[0].half_the_steps(found, self.beside.rests[0], smooth.rests[0])
             if not self.beside.pulls:
@@ -190,6 +200,7 @@ class LargeContactSolution:
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
         found = estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
+        found = replace(found, shortening_bar=bar * self.shortening + abs(finer.shortening - self.shortening))
         if not self.rests:
             return found
         (rest, *_), (again, *_) = self.rests, finer.rests

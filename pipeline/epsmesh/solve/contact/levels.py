@@ -7,7 +7,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from epsmesh.arrays import BoolArray, FloatArray, Int32Array
-from epsmesh.scene.model import BELOW, LOOSE, PROBE
+from epsmesh.scene.model import BELOW, LOOSE, PROBE, TOOL
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
 from epsmesh.solve.contact.normals import means_of, nodal_normals
 from epsmesh.solve.contact.numbering import Numbering, Pairs, pairs_of
@@ -45,12 +45,29 @@ class Surface:
         return self._found[degree]
 
     def pairs(self, degree: int) -> Pairs | None:
-        """Return the pairs of nodes of loose tissue and the tissue below it; None without any; collective."""
+        """Return the pairs of nodes of loose tissue and the tissue below it; None without any; collective.
+
+        With a tool that deforms they are those of the tissue, which are called upper ones, and the tool's above them.
+        """
         if degree not in self._pairs:
-            self._pairs[degree] = self._pairs_of(degree) if LOOSE in self._conditions.beds else None
+            made = self._of_tool if self._conditions.deforms else self._of_loose
+            is_any = self._conditions.deforms or LOOSE in self._conditions.beds
+            self._pairs[degree] = made(degree) if is_any else None
         return self._pairs[degree]
 
-    def _pairs_of(self, degree: int) -> Pairs:
+    def _of_tool(self, degree: int) -> Pairs:
+        space, candidates = self.space(degree), self.of(degree)
+        is_free = np.ones(space.owned)
+        is_free[space.prescribed_owned] = 0.0
+
+        def normal(_: Numbering, free: FloatArray) -> FloatArray:
+            return np.tile([0.0, 0.0, -1.0], (len(free), 1))
+
+        own = np.arange(len(candidates))[part_of(candidates).nodes]
+        facets = self.spaces.body.facets[TOOL]
+        return pairs_of(space.space, facets, candidates, own, is_free, normal, are_apart=True)
+
+    def _of_loose(self, degree: int) -> Pairs:
         loose = part_of(self.of(degree), 1 + self._conditions.beds.index(LOOSE))
         space, nodes = self.space(degree), np.arange(len(self.of(degree)))[loose.nodes]
         is_free = np.ones(space.owned)

@@ -18,7 +18,7 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned import turned_frames
 
-# Nodes of both surfaces are at the same place within this share of the surface's extent.
+# Nodes of both surfaces are above each other within this share of the surface's extent.
 _SAME = 1e-7
 
 
@@ -84,7 +84,9 @@ class Numbering:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Pairs of nodes of two surfaces of tissue that touch: ``upper`` and ``lower`` ones, n each, at the same places.
+    """Pairs of nodes of two surfaces that touch: ``upper`` and ``lower`` ones, n each, at the same places.
+
+    Those of a tool that deforms are above each other along z: upper ones are the tissue's, lower ones the tool's.
 
     Contact holds the displacement w of an upper node relative to its lower one, along the unit ``normal`` (n, 3) into
     the upper body, and where tissue sticks. Displacements are therefore written as u = S v. At upper nodes v is in
@@ -195,11 +197,14 @@ def pairs_of(
     upper: IntArray,
     is_free: FloatArray,
     normal: Callable[[Numbering, FloatArray], FloatArray],
+    *,
+    are_apart: bool = False,
 ) -> Pairs:
     """Return the pairs of the ``upper`` candidates, by their numbers among all, and nodes of the facets ``below`` them.
 
     ``is_free`` are 0 at prescribed dofs of the space, owned, else 1; ``normal`` gives normals (n, 3) to upper nodes, of
-    which (n, 3) components are free. Collective.
+    which (n, 3) components are free. Nodes of a pair are at the same place, or, if they ``are_apart``, above each other
+    along z. Collective.
 
     Raises:
         SolveError: if a candidate has no node below it, or if the support holds only components of upper nodes across
@@ -211,10 +216,10 @@ def pairs_of(
     known = np.asarray(index_map.local_to_global(here), dtype=np.int64)
     numbers = np.concatenate(comm.allgather(known))
     places = np.concatenate(comm.allgather(np.asarray(space.tabulate_dof_coordinates())[here]))
-    points = candidates.points[upper]
-    away, nearest = cKDTree(places).query(points)
+    points, axes = candidates.points[upper], slice(2 if are_apart else 3)
+    away, nearest = cKDTree(places[:, axes]).query(points[:, axes])
     if len(np.unique(nearest)) < len(upper) or away.max(initial=0.0) > _SAME * float(np.ptp(points, axis=0).max()):
-        raise SolveError("the surfaces of loose tissue and of the tissue below it have different nodes")
+        raise SolveError("two surfaces that touch have different nodes")
     of_upper = Numbering(space, candidates.numbers[upper])
     free = of_upper.gather_vectors(is_free)
     normals = normal(of_upper, free)

@@ -84,7 +84,8 @@ class ContactSearch:
         is_large = not asked.law.is_linear or self._tool.normal is not None or self._tool.beds
         # Two jaws with friction have one path, on half of the body and on the whole.
         is_bent |= self._elements.body.is_halved and self._tool.friction > 0
-        if is_large or self._elements.displacements.terms or is_bent:
+        space = self._elements.displacements
+        if is_large or space.terms or space.conditions.deforms or is_bent:
             return self._solve_large(asked, stack)
         law, movement, strict = asked.law, asked.movement, _STRICTER * asked.tolerance
         columns = self._elements.columns(movement, stack)

@@ -254,9 +254,19 @@ class Candidates:
 
     @property
     def of_contacts(self) -> list[IntArray]:
-        """The nodes that each of several contacts may touch."""
-        assert self.contacts is not None
+        """The nodes that each of the contacts may touch."""
+        if self.contacts is None:
+            return [np.arange(len(self))]
         return [np.unique(self.facets[self.contacts == number]) for number in range(int(self.contacts.max()) + 1)]
+
+    def at(self, place: tuple[float, float], values: FloatArray) -> float:
+        """Return the value at a ``place`` (m), x and y, of nodal ``values`` (n), in the facet there or nearest."""
+        corners = self.points[self.facets[:, :FACET_CORNERS], :2]
+        first, sides = corners[:, 0], np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+        shares = np.linalg.solve(sides, (np.array(place) - first)[:, :, None])[:, :, 0]
+        shares = np.column_stack([1 - shares.sum(axis=1), shares])
+        facet = int(shares.min(axis=1).argmax())
+        return float((self.shape.values(shares[facet][None]) @ values[self.facets[facet]])[0])
 
     def _near(self, higher: "Candidates") -> IntArray:
         """Return pairs (k, 2) of a node and a neighbouring node of a ``higher`` degree, each once."""

@@ -26,8 +26,9 @@ class SurfaceContact:
     """A ``tool`` that has ``touched`` the ``candidates`` of the modelled part of a body; ``coarse`` with friction.
 
     The points of the candidates are where the contact is: at rest in linear elasticity, else deformed. ``modulus`` (n)
-    is E / (1 - ν²) of the tissue there (Pa), ``mirrored`` are the axes of the planes of symmetry. ``coarse`` is the
-    contact from half as many load steps. With ``is_halved`` a second jaw is the image of the tool.
+    is E / (1 - ν²) of the tissue there (Pa), with a tool that deforms that of both in series, ``mirrored`` are the axes
+    of the planes of symmetry. ``coarse`` is the contact from half as many load steps. With ``is_halved`` a second jaw
+    is the image of the tool.
     """
 
     candidates: Candidates
@@ -98,6 +99,6 @@ def on_surface(
     candidates = part.candidates
     if not body.law.is_linear:
         candidates = replace(candidates, points=part.of(body.positions()))
-    modulus, mirrored = candidates.from_regions(body.law.plane_moduli), body.elements.body.mirrored
+    modulus, mirrored = candidates.from_regions(body.moduli()), body.elements.body.mirrored
     coarse, is_halved = None if coarse is None else part.solution(coarse), body.elements.body.is_halved
     return SurfaceContact(candidates, part.solution(touched), tool, modulus, mirrored, coarse, is_halved)

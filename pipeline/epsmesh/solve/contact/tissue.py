@@ -4,6 +4,7 @@ Linear systems are solved in turned frames, in which the normal displacement of 
 """
 
 from contextlib import ExitStack
+from math import nan
 
 import numpy as np
 
@@ -167,6 +168,13 @@ class DeformedBody:
             self._parts[number] = part_of(self.candidates, number)
         return self._parts[number]
 
+    def moduli(self, number: int = TOOL) -> tuple[float, ...]:
+        """Return E / (1 - ν²) (Pa) of each region; in contact with a tool that deforms, of both in series."""
+        found = self.law.plane_moduli
+        if number != TOOL or not self._space.conditions.deforms:
+            return found
+        return tuple(1 / (1 / own + 1 / found[-1]) for own in found)
+
     @property
     def places(self) -> FloatArray:
         """The nodes' places (n, 3) at rest, in m."""
@@ -182,6 +190,20 @@ class DeformedBody:
     def residual(self) -> FloatArray:
         """Return the nodal forces (N) of the displacement, owned dofs, reactions of the support included."""
         return self._forces()[: self._space.owned].copy()
+
+    def shortening(self, foot: tuple[float, float]) -> float:
+        """Return how far (m) a tool that deforms gives way along its axis, at its ``foot`` (m); NaN of a rigid one."""
+        if self._pairs is None or not self._space.conditions.deforms:
+            return nan
+        part, beside = self.part(), np.zeros(self.fixed.shape)
+        beside[self._pairs.nodes] = self._pairs.lower.gather_vectors(self._now.array[: self._space.owned])
+        return part.candidates.at(foot, part.of(beside)[:, 2])
+
+    @property
+    def mount_force(self) -> float:
+        """The force (N) on the mount of a tool that deforms, against its advance; collective."""
+        local = self.residual().reshape(-1, 3)[self._space.mount_owned, 2].sum()
+        return -float(global_sum(self._space.comm, np.array([local]))[0])
 
     def split(self, state: FloatArray) -> list[FloatArray]:
         """Return a state by field."""

@@ -56,7 +56,7 @@ class HierarchicalEstimate:
     ``at_edge`` what the size of the elements at its edge has of it.
     ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
     ``rest_force_bar`` that on the force of such a jaw, ``rest_slip_bar`` (m) that on the slip along such a support.
-    ``pull`` is what jaws do that are pulled, with its bars.
+    ``pull`` is what jaws do that are pulled, with its bars; ``shortening_bar`` (m) that on how far a tool gives way.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
@@ -73,6 +73,7 @@ class HierarchicalEstimate:
     rest_slip_bar: float = nan
     friction_bar: float = 0.0
     pull: PullResult | None = None
+    shortening_bar: float = nan
     is_solved: bool = False
 
 

@@ -170,8 +170,8 @@ def terms_of(scene: Scene) -> tuple[BodyTerm, ...]:
 
 def has_terms(scene: Scene) -> bool:
     """Return whether anything acts on the body besides its law, the tool and dead loads: terms, a support that lets
-    go, a loose layer, or a second jaw."""
-    touched = scene.body.resting, scene.body.loose, scene.probe.jaw
+    go, a loose layer, a second jaw, or a tool that deforms."""
+    touched = scene.body.resting, scene.body.loose, scene.probe.jaw, scene.probe.elastic
     return bool(terms_of(scene)) or any(one is not None for one in touched)
 
 
@@ -372,6 +372,18 @@ FEATURES: dict[str, Feature] = {
     ),
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
+    ),
+    "tool that deforms": Feature(
+        "probe.young", lambda s: s.probe.elastic is not None, write=lambda young: f"{young:.6g} Pa"
+    ),
+    "tool of a shape that does not deform": Feature(
+        "probe.shape", lambda s: s.probe.elastic is not None and s.probe.tip_shape is None
+    ),
+    "tool that deforms beside a plane": Feature(
+        "probe.axis",
+        lambda s: s.probe.elastic is not None and not (isinstance(s.body, Layered) and _is_flat(s)),
+        ("body",),
+        lambda axis: axis and list(axis),
     ),
     "prescribed footprint on a loose layer": Feature(
         "probe.contact", lambda s: s.body.loose is not None and not s.probe.is_unilateral, ("body",)

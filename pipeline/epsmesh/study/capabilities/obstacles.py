@@ -88,7 +88,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
     "F_exact": {
         "time steps": "F_exact is static, and these forces are no multiples of static ones",
         "friction": "with friction, F_exact would not be more accurate than F on a fine mesh",
-        "terms": "F_exact is of the body on a fixed support and the tool alone",
+        "terms": "F_exact is of the body on a fixed support and a rigid tool alone",
         "large displacements": "at large displacements, F_exact would not be more accurate than F on a fine mesh",
         "inclined touch of a linear law": "beside the tool's axis, F_exact would not be more accurate than F on a fine "
         "mesh",
@@ -99,7 +99,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "relaxation": "material.relaxation: a scene of SOFA is static",
         "loads": "[load]: a scene of SOFA has the tool's force alone",
         "grasp": "probe.together: a scene of SOFA has one tool",
-        "terms": "[load], body.capsule, body.support: a scene of SOFA has the tool's force and the tissue alone",
+        "terms": "[load], body.capsule, body.support, probe.young: a scene of SOFA has tissue and a rigid tool alone",
         "half ball": 'mesh.epsilon: the far field of a half ball has no counterpart in SOFA: use epsilon = "full"',
         "six motions": "probe.motion: a scene of SOFA has one motion",
         "slit": "probe.incision: a scene of SOFA has no slit",
@@ -119,6 +119,7 @@ OBSTACLES: dict[str, dict[str, str]] = {
         "capsule of a hollow region": "{key}: capsules of hollow regions have no real-time model. Omit it",
         "support that lets go": "body.support: a real-time model has a fixed support. Give body.fixed",
         "loose layer": "{key}: in a real-time model all tissue is bonded. Omit it",
+        "tool that deforms": "probe.young: a real-time model has a rigid tool. Omit it",
         "grasp": "probe.together: a real-time model has one tool. Omit the second [[probe]] table",
         "fibres": "{key}: fibres have a direction, and the half-space of a real-time model has none",
         "varying stiffness": "{key}: the half-space of a real-time model has one modulus. Give a value",

@@ -39,7 +39,10 @@ STEPS_IN_SPACE = (
     "use a round tool on the axis of a round body"
 )
 _NO_LOADS = "omit [load], and pressure in hollow regions"
-_WITH_TERMS = "with springs or other terms in [load], a capsule, a support that lets go, a loose layer, or two jaws"
+_WITH_TERMS = (
+    "with springs or other terms in [load], a capsule, a support that lets go, a loose layer, two jaws, or a tool that "
+    "deforms"
+)
 _NO_TERMS = "omit them"
 _TERMS: dict[str, type[BodyTerm]] = {**TERMS, "capsule": Capsule}
 _LINEAR = "needs linear elasticity: omit it with a law of large displacements"
@@ -319,6 +322,35 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal("loose layer", "time steps", f"is static, and {_IN_STEPS}: {_STATIC}"),
     *(Refusal(name, "loose layer", f"{_LOOSE}: omit it, or the layer's contact") for name in ("influence", "spread")),
+    # A tool that deforms: it is a part of the mesh, above the surface that it may touch.
+    Refusal(
+        "tool of a shape that does not deform",
+        "tool that deforms",
+        'is rigid: tools that deform are a "sphere", a "cone", and a "disc" with a rounded `edge` in contact = '
+        '"unilateral". Omit `young`, `poisson` and `height`',
+    ),
+    Refusal(
+        "tool that deforms",
+        "large displacements",
+        f"is not computed {_OF_LAW}: its nodes would leave those of the tissue, above which they are. Omit it, for a "
+        "rigid tool",
+    ),
+    Refusal(
+        "tool that deforms beside a plane",
+        "tool that deforms",
+        "needs a plane face of a box or a cylinder, and a tool that presses at right angles to it, as the nodes of a "
+        "tool that deforms are above those of the tissue: omit `young` for a rigid tool",
+    ),
+    Refusal("tool that deforms", "loose layer", "is not computed above loose tissue: omit it, or the tissue's contact"),
+    Refusal("friction", "tool that deforms", "is not computed on a tool that deforms: omit it, or probe.young"),
+    Refusal("tool that deforms", "grasp", "is not computed with two jaws: omit it, or `together`"),
+    Refusal("tool that deforms", "accuracy", "is meshed with given sizes alone: give sizes, or omit it"),
+    Refusal("tool that deforms", "region", "is meshed on boxes and cylinders alone: use an inclusion, or omit it"),
+    Refusal("tool that deforms", "time steps", f"is static, and {_IN_STEPS}: {_STATIC}"),
+    *(
+        Refusal(name, "tool that deforms", "is not computed below a tool that deforms: omit it, or probe.young")
+        for name in ("influence", "spread")
+    ),
     # Two jaws: the contact of the second one is found with that of the tool.
     Refusal("prescribed footprint of a grasp", "grasp", FOUND_TOGETHER),
     Refusal(
