@@ -143,7 +143,8 @@ AT_SHARP_END_LINEAR: Annotated[float, Fit("share of the contact at sharp ends", 
 FOUND_LARGE: Annotated[Range, Fit("F_2 - F_3", _DEEP, "2026-11-27")] = (1.08, 0.35)
 FOUND_LARGE_AT_EDGE: Annotated[float, Fit("relative bar on the area", _DEEP, "2026-11-27")] = 0.12
 FOUND_LARGE_DEGREE: Annotated[int, Fit("degree of the elements", _DEEP, "2026-11-27")] = 2
-# The same where a linear law has contact found again below a flat tool on a support, or of two flat jaws.
+# The same with a linear law: of balls, whose contact gains whole nodes; of flat tools on a support, or as both jaws.
+FOUND_BALL_AGAIN: Annotated[Range, Fit("F_2 - F_3", _ASKED, "2026-11-30")] = (0.85, 0.55)
 FOUND_FLAT: Annotated[Range, Fit("F_2 - F_3", _ASKED, "2026-11-30")] = (1.2, 0.75)
 # The bar on the area, for the size of elements at the contact's edge.
 AREA: Annotated[float, Fit("area of nodes that share a facet with the contact's edge", _COVERAGE, "2026-11-24")] = 0.07

@@ -123,8 +123,14 @@ BALL_LARGE = (
     Recipe(2, 0.08, 0.17, 1.15e-3),
     Recipe(2, 0.06, 0.14, 8.6e-4),
 )
-# With a linear law, contact that is found again in one degree more may be a node's more or less on larger elements.
-BALL_AGAIN = BALL_LARGE[2:]
+# With a linear law, contact that is found again gains whole nodes: on larger elements its change says little.
+BALL_AGAIN = (
+    Recipe(2, 0.4, 0.6, 1.1e-2),
+    Recipe(2, 0.3, 0.45, 6.0e-3),
+    Recipe(2, 0.25, 0.35, 4.5e-3),
+    Recipe(2, 0.2, 0.3, 3.6e-3),
+    *BALL_LARGE[6:],
+)
 # At large displacements, elements of degree 3, and very small ones, fold at the probe's edge.
 LARGE = (
     *LADDER[:4],

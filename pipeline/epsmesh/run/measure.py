@@ -109,6 +109,7 @@ def convergence_of(solve: Solve) -> Convergence:
         has_others=not is_plain or (case.body.resting is not None and not is_sure_opposite(case)),
         is_nonlinear=case.way.is_nonlinear,
         is_ball=is_ball(case),
+        is_linear=not case.way.is_large,
         is_flat=has_flat(case),
         is_closed=MIDDLE in solve.mirrors or is_closed(case),
     )

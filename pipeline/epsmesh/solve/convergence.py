@@ -11,8 +11,8 @@ class Convergence:
     graded to the expected edge of contact, and ``is_fine`` that elements are small at the edge of a disc on a plain
     body. ``has_others`` says that F has errors from other places than the probe's edge, ``is_nonlinear`` that
     Newton's method solves it, as at large displacements, and ``is_ball`` that the tool is a ball in unilateral contact,
-    or both jaws are. ``is_flat``: at small displacements, a tool on a support, or both jaws, are flat.
-    ``is_closed`` says that what else touches the body carries the force of the tool, and nothing else does.
+    or both jaws are. ``is_linear`` says that the law is, ``is_flat`` that it is and a tool on a support, or both jaws,
+    are flat. ``is_closed`` says that what else touches the body carries the force of the tool, and nothing else does.
 
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
     that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
@@ -27,6 +27,7 @@ class Convergence:
     has_others: bool = False
     is_nonlinear: bool = False
     is_ball: bool = False
+    is_linear: bool = False
     is_flat: bool = False
     is_closed: bool = False
     plain: float = 0.0

@@ -179,7 +179,8 @@ def _extrapolate_found_large(
     is_known = (known.is_ball or known.is_flat) and known.degree == fitted.FOUND_LARGE_DEGREE and known.is_graded
     if not is_known or known.has_others or known.friction_bar or decrements[0, 0] <= 0:
         return stiffness, bars
-    centre, spread = fitted.FOUND_LARGE if known.is_ball else fitted.FOUND_FLAT
+    of_ball = fitted.FOUND_BALL_AGAIN if known.is_linear else fitted.FOUND_LARGE
+    centre, spread = of_ball if known.is_ball else fitted.FOUND_FLAT
     change = fitted.FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`
     least = fitted.FOUND_LARGE_AT_EDGE * known.at_edge * np.abs(stiffness)
     return stiffness - centre * change, np.maximum(spread * change, least)
