@@ -76,7 +76,7 @@ class ContactResult:
         rest = self.rest
         assert rest is not None
         x, y, z = (force + change * n for force, n in zip(rest.force, rest.normal, strict=True))
-        return replace(self, rest=replace(rest, force=(x, y, z), force_bar=bar))
+        return replace(self, rest=replace(rest, force=(x, y, z), pressed=rest.pressed + change, force_bar=bar))
 
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.

@@ -84,6 +84,7 @@ class SurfaceContact:
         return RestResult(
             force=(x, y, 0.0 - z),
             normal=(0.0, 0.0, 1.0),
+            pressed=0.0 - z,
             area=found.area,
             lifted=0.0,
             torque=0.0 - found.torque,
