@@ -22,7 +22,8 @@ from epsmesh.plan.recipe import (
 from epsmesh.plan.refinement import is_refined
 from epsmesh.plan.steps import Solve
 from epsmesh.run.record import Record
-from epsmesh.run.tools import normal_of
+from epsmesh.run.tools import beds_on, normal_of
+from epsmesh.scene.model import JAW, LOOSE
 from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
@@ -148,33 +149,25 @@ def _of_contact(contact: ContactResult | None, *, has_history: bool) -> dict[str
 
 def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
     """Return what a record has of what touches the body besides the tool; ``bar`` is the relative one on the force."""
-    contact, rest = solution.contact, None if solution.contact is None else solution.contact.rest
-    if case.probe.elastic and contact is not None:
-        of_tool = {"tool_shortening": contact.shortening, "tool_shortening_error": contact.shortening_bar}
-    else:
-        of_tool = {}
-    return of_tool | _of_second(case, solution, rest, bar)
+    if (contact := solution.contact) is None:
+        return {}
+    found = _of_pull(contact.pull, bar)
+    if case.probe.elastic:
+        found |= {"tool_shortening": contact.shortening, "tool_shortening_error": contact.shortening_bar}
+    for name, rest in zip(beds_on(case), contact.rests, strict=True):
+        found |= _of_jaw(case, rest) if name == JAW else _of_tissue(case, rest) if name == LOOSE else of_rest(solution)
+    return found
 
 
-def _of_second(case: Case, solution: Solution, rest: RestResult | None, bar: float) -> dict[str, float]:
-    """Return the same of a second jaw, a support, or the tissue below a loose layer."""
-    if case.jaw:
-        return _of_jaw(case, solution.contact, bar)
-    if case.body.loose is None or rest is None:
-        return of_rest(solution)
+def _of_tissue(case: Case, rest: RestResult) -> dict[str, float]:
+    """Return what a record has of the tissue that loose tissue touches, by the names in the dataset."""
     found = {"interface_force": rest.pressed, "interface_force_error": rest.force_bar * abs(rest.pressed)}
     found |= {"lift_off_area": rest.lifted, "lift_off_area_error": rest.bar * rest.area}
     return found | {"interface_area": rest.area + rest.lifted} | _by_axis("interface_force_vector", case, rest.force)
 
 
-def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, float]:
-    """Return what a record has of a second jaw, by the names in the dataset: forces are those of the tissue on it.
-
-    ``bar`` is the relative one on the force along the axis.
-    """
-    if contact is None or contact.rest is None:
-        return {}
-    rest = contact.rest
+def _of_jaw(case: Case, rest: RestResult) -> dict[str, float]:
+    """Return what a record has of a second jaw, by the names in the dataset: forces are those of the tissue on it."""
     x, y, z = rest.force
     return {
         "jaw_force": rest.pressed,
@@ -183,7 +176,6 @@ def _of_jaw(case: Case, contact: ContactResult | None, bar: float) -> dict[str, 
         "jaw_contact_area_error": rest.bar * rest.area,
         "jaw_torque": rest.torque,
         "jaw_torque_error": rest.torque_bar,
-        **_of_pull(contact.pull, bar),
         **_by_axis("jaw_force_vector", case, (0.0 - x, 0.0 - y, 0.0 - z)),
     }
 
@@ -218,9 +210,9 @@ def of_rest(solution: Solution) -> dict[str, float]:
     Its force differs from that of the tool by the weight of the body, and has the same error.
     """
     contact = solution.contact
-    if contact is None or contact.rest is None:
+    if contact is None or not contact.rests:
         return {}
-    rest = contact.rest
+    rest, *_ = contact.rests
     across = zip(rest.normal, rest.force, solution.reaction_bars, strict=True)
     parts = [(n * f, abs(n) * bar) for n, f, bar in across if abs(n) > _ROUNDING]
     return {

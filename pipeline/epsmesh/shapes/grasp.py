@@ -54,7 +54,7 @@ def is_halved(body: Body, probe: Probe) -> bool:
     That is said of shapes, supports and layers. Fields of moduli, directions of fibres, and terms are not considered.
     """
     jaw = opposite(body, probe)
-    if jaw is None or not isinstance(body, Layered):
+    if jaw is None or not isinstance(body, Layered) or body.loose is not None:
         return False
     frame, own = probe.frame_on(body), jaw.frame_on(body)
     # Seen along its own axis, the image of a tool is reflected.

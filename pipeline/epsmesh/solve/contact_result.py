@@ -22,9 +22,10 @@ class ContactResult:
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
     first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere
     the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
-    bar by the size of elements there. ``rest`` is what a support that lets go, or a second jaw, does. ``shift`` (m) is
-    how far loads move the place of contact across the axis, NaN where the tool follows. ``pull`` is what jaws do that
-    are pulled. ``shortening`` (m) is how far a tool that deforms gives way on its axis, with a 95 % bar (m).
+    bar by the size of elements there. ``rests`` are what else touches the body: a support that lets go, a second jaw,
+    tissue. ``shift`` (m) is how far loads move the place of contact across the axis, NaN where the tool follows.
+    ``pull`` is what jaws do that are pulled. ``shortening`` (m) is how far a tool that deforms gives way on its axis,
+    with a 95 % bar (m).
     """
 
     area: float
@@ -42,7 +43,7 @@ class ContactResult:
     is_ended: bool = False
     at_edge: float = 0.0
     shift: float = nan
-    rest: "RestResult | None" = None
+    rests: tuple["RestResult", ...] = ()
     pull: "PullResult | None" = None
     shortening: float = nan
     shortening_bar: float = nan
@@ -67,16 +68,15 @@ class ContactResult:
 
     def with_least_bar(self, share: float) -> "ContactResult":
         """Return the contact with a relative bar on its area of at least ``share``, where it has one."""
-        rest = None if self.rest is None else self.rest.with_least_bar(share)
+        rests = tuple(rest.with_least_bar(share) for rest in self.rests)
         pull = None if self.pull is None else self.pull.with_least_bar(share)
-        return replace(self, bar=max(self.bar, share), rest=rest, pull=pull)  # max(nan, share) is NaN
+        return replace(self, bar=max(self.bar, share), rests=rests, pull=pull)  # max(nan, share) is NaN
 
     def with_opposite(self, change: float, bar: float) -> "ContactResult":
         """Return the contact whose opposite carries a ``change`` of F (N), too, and has the relative ``bar`` of F."""
-        rest = self.rest
-        assert rest is not None
+        (rest,) = self.rests
         x, y, z = (force + change * n for force, n in zip(rest.force, rest.normal, strict=True))
-        return replace(self, rest=replace(rest, force=(x, y, z), pressed=rest.pressed + change, force_bar=bar))
+        return replace(self, rests=(replace(rest, force=(x, y, z), pressed=rest.pressed + change, force_bar=bar),))
 
     def with_friction(self, rubbing: "Rubbing", torque: float, mirrored: Sequence[int]) -> "ContactResult":
         """Return the contact with friction.
@@ -92,9 +92,21 @@ class ContactResult:
 
 
 @dataclass(frozen=True)
+class RestBars:
+    """95 % bars of what touches a body besides the tool: relative ones on the ``area`` in contact and on the ``force``
+    of a jaw or of tissue, and that on the ``slip`` (m) along a support; NaN if unknown."""
+
+    area: float = nan
+    force: float = nan
+    slip: float = nan
+
+
+@dataclass(frozen=True)
 class RestResult:
-    """A body on a support that lets go, or held by a second jaw: its ``force`` (3), N, on the body, the ``area`` (m²)
-    in contact, and the rest of what it may touch, which has ``lifted`` off (m²).
+    """What touches a body besides the tool: a support that lets go, a second jaw, or tissue below loose tissue.
+
+    Its ``force`` (3), N, on the body, the ``area`` (m²) in contact, and the rest of what it may touch, which has
+    ``lifted`` off (m²).
 
     ``normal`` (3) is the unit vector into the body, zero where it is another one at each place. ``pressed`` (N) is the
     force along it. ``bar`` is the relative 95 % bar on the area, ``force_bar`` that on
@@ -113,6 +125,10 @@ class RestResult:
     slip: float = nan
     slip_bar: float = nan
     pressed: float = nan
+
+    def with_bars(self, bars: RestBars) -> "RestResult":
+        """Return it with its bars."""
+        return replace(self, bar=bars.area, force_bar=bars.force, slip_bar=bars.slip)
 
     def with_least_bar(self, share: float) -> "RestResult":
         """Return it with relative bars on force and area of a jaw of at least ``share``."""

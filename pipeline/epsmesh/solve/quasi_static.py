@@ -23,7 +23,7 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import Conditions, Front
 from epsmesh.solve.contact.search import ContactSearch
 from epsmesh.solve.contact.tool import Tool
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import ContactResult, RestBars
 from epsmesh.solve.crack import Advance
 from epsmesh.solve.elements import elements_of
 from epsmesh.solve.elements.base import Elements, Equilibrium, HierarchicalEstimate, rate_of_linear
@@ -314,10 +314,9 @@ def _with_bars(
 ) -> ContactResult:
     """Return a contact with its bars; the second jaw has those of the tool, ``relative`` on F, if it is its image."""
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
-    if (rest := contact.rest) is not None:
-        area, force = (finer.area_bar, float(relative[0])) if is_halved else (finer.rest_bar, finer.rest_force_bar)
-        found = replace(found, rest=replace(rest, bar=area, force_bar=force, slip_bar=finer.rest_slip_bar))
-    found = replace(found, shortening_bar=finer.shortening_bar)
+    bars = (RestBars(finer.area_bar, float(relative[0])),) if is_halved else finer.rests
+    rests = tuple(rest.with_bars(own) for rest, own in zip(contact.rests, bars, strict=False))
+    found = replace(found, rests=rests, shortening_bar=finer.shortening_bar)
     if finer.pull is not None:
         found = replace(found, pull=finer.pull)
     if contact.rubbing is None or finer.relative is None:

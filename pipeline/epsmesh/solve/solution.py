@@ -190,7 +190,7 @@ class Solution:
             )
             stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
             best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)
-            if contact.rest is None or not known.is_closed:
+            if not contact.rests or not known.is_closed:
                 return best
             force, bar = best.reaction[2], best.reaction_bars[2]
             return replace(best, contact=contact.with_opposite(force - self.reaction[2], bar / abs(force)))

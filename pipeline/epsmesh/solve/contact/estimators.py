@@ -68,7 +68,7 @@ def half_the_steps(found: HierarchicalEstimate, contact: SurfaceContact, without
         area_bar=at_edge + (found.area_bar - found.at_edge),
         at_edge=at_edge,
         friction_bar=of_friction,
-        rest_force_bar=found.rest_force_bar + of_friction,
+        rests=tuple(replace(rest, force=rest.force + of_friction) for rest in found.rests),
     )
 
 

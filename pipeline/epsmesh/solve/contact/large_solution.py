@@ -38,7 +38,7 @@ from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
-from epsmesh.solve.contact_result import ContactResult
+from epsmesh.solve.contact_result import ContactResult, RestBars
 from epsmesh.solve.elements.base import Equilibrium, HierarchicalEstimate, Rate
 from epsmesh.solve.elements.fields import Column
 from epsmesh.solve.estimate import found_again_bar
@@ -131,8 +131,8 @@ class LargeContactSolution:
         """Return the whole contact, with the effects of loads."""
         stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
         found = self.surface_contact.result(self.sagged.sag, stored)
-        found = replace(found, rest=self.rests[0].result()) if self.rests else found
-        found = replace(found, shortening=self.shortening)
+        rests = tuple(rest.result() for rest in self.rests)
+        found = replace(found, rests=rests, shortening=self.shortening)
         if self.beside is None or not self.beside.pulls:
             return found
         return replace(found, pull=self.beside.pulls[-1].result(self.body.elements.body))
@@ -175,15 +175,15 @@ class LargeContactSolution:
             self.body.state = state
             found = half_the_steps(found, self.surface_contact, smooth.force)
             more = found.friction_bar * self.shortening
-            found = replace(found, shortening_bar=found.shortening_bar + more)
-            if self.rests and self.rests[0].bed.is_support:
-                return self.rests[0].half_the_steps(found, self.beside.rests[0], smooth.rests[0])
+            both = zip(self.rests, found.rests, self.beside.rests, smooth.rests, strict=True)
+            rests = tuple(rest.half_the_steps(bars, coarse, of_smooth) for rest, bars, coarse, of_smooth in both)
+            found = replace(found, rests=rests, shortening_bar=found.shortening_bar + more)
             if not self.beside.pulls:
                 return found
             above = (self.body, self.surface, self.beside.smooth.tool, self.depth, self.beside.closing)
             assert found.relative is not None
             at_edge = max([self.surface_contact.area.bar, *(rest.area.bar for rest in self.rests)])
-            of_jaws = [float(found.relative[0]), *([found.rest_force_bar] if self.rests else [])]
+            of_jaws = [float(found.relative[0]), *(rest.force for rest in found.rests)]
             bars = of_jaws, at_edge
             return replace(found, pull=with_bars(self.beside.pulls, *above, bars, stack))
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
@@ -201,15 +201,15 @@ class LargeContactSolution:
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
         found = estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
         found = replace(found, shortening_bar=bar * self.shortening + abs(finer.shortening - self.shortening))
-        if not self.rests:
-            return found
-        (rest, *_), (again, *_) = self.rests, finer.rests
-        return replace(
-            found,
-            rest_bar=bar + rest.bar + abs(again.area.value / rest.area.value - 1),
-            rest_force_bar=rest.force_bar(again, degree, at_edge, at_end),
-            rest_slip_bar=bar * rest.slip + abs(again.slip - rest.slip),
+        of_rests = (
+            RestBars(
+                area=bar + rest.bar + abs(again.area.value / rest.area.value - 1),
+                force=rest.force_bar(again, degree, at_edge, at_end),
+                slip=bar * rest.slip + abs(again.slip - rest.slip),
+            )
+            for rest, again in zip(self.rests, finer.rests, strict=True)
         )
+        return replace(found, rests=tuple(of_rests))
 
     def rate(self, columns: Sequence[Column], movement: Movement) -> Rate:
         """Return the rate with the same nodes in contact."""

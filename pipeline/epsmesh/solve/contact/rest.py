@@ -16,8 +16,7 @@ from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact.turned import turned_frames
-from epsmesh.solve.contact_result import RestResult
-from epsmesh.solve.elements.base import HierarchicalEstimate
+from epsmesh.solve.contact_result import RestBars, RestResult
 from epsmesh.solve.estimate import found_again_bar, unresolved
 from epsmesh.solve.response import whole_force
 
@@ -166,15 +165,17 @@ class Rest:
             return 0.0
         return share_at_end(self.candidates, self.touched.active, self.bed.ends_at, self._axes)
 
-    def half_the_steps(self, found: HierarchicalEstimate, coarse: "Rest", smooth: "Rest") -> HierarchicalEstimate:
-        """Return the estimate ``found`` beside this support's friction, with the bars of that.
+    def half_the_steps(self, found: RestBars, coarse: "Rest", smooth: "Rest") -> RestBars:
+        """Return the bars ``found`` beside this friction, with those of that, of a support.
 
         They are the changes from half as many load steps, ``coarse``. The relative bar on slip is that of the contact
         beside, ``smooth``, unknown if the support sticks there.
         """
+        if not self.bed.is_support:
+            return found
         of_area, of_slip = abs(coarse.area.value / self.area.value - 1), abs(coarse.slip - self.slip)
-        of_mesh = found.rest_slip_bar / smooth.slip if smooth.slip else 0.0 if self.bed.sticks else nan
-        return replace(found, rest_bar=found.rest_bar + of_area, rest_slip_bar=of_mesh * self.slip + of_slip)
+        of_mesh = found.slip / smooth.slip if smooth.slip else 0.0 if self.bed.sticks else nan
+        return replace(found, area=found.area + of_area, slip=of_mesh * self.slip + of_slip)
 
 
 def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> tuple[Rest, ...]:

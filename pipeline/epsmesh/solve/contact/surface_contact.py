@@ -74,7 +74,7 @@ class SurfaceContact:
             rubbing = rubbing_of(self.candidates, self.tool.friction, self.touched, self.coarse)
             torque = self.tool.torque(self.candidates.points, self.touched.forces)
             found = found.with_friction(rubbing, torque, self.mirrored)
-        return replace(found, rest=self._image(found)) if self.is_halved else found
+        return replace(found, rests=(self._image(found),)) if self.is_halved else found
 
     def _image(self, found: ContactResult) -> RestResult:
         """Return what the image of the tool does, in a plane normal to its axis; ``found`` is the tool's contact."""

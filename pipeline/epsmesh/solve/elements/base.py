@@ -15,7 +15,7 @@ from epsmesh.arrays import FloatArray, Int32Array
 from epsmesh.solve.coarse_levels import CoarseSpace
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.conditions import Front
-from epsmesh.solve.contact_result import ContactResult, PullResult
+from epsmesh.solve.contact_result import ContactResult, PullResult, RestBars
 from epsmesh.solve.crack import Release
 from epsmesh.solve.elements.fields import Column, ElementFields, Fields
 from epsmesh.solve.elements.tangent import Tangent
@@ -54,9 +54,8 @@ class HierarchicalEstimate:
     reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact,
     ``at_edge`` what the size of the elements at its edge has of it.
-    ``rest_bar`` is that on the area in which the body rests on a support that lets go, or touches a second jaw,
-    ``rest_force_bar`` that on the force of such a jaw, ``rest_slip_bar`` (m) that on the slip along such a support.
-    ``pull`` is what jaws do that are pulled, with its bars; ``shortening_bar`` (m) that on how far a tool gives way.
+    ``rests`` are the bars of what touches the body besides the tool. ``pull`` is what jaws do that are pulled, with its
+    bars; ``shortening_bar`` (m) that on how far a tool gives way.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
     ``is_solved`` says that the nonlinear problem was solved in that degree, and not its linearisation.
     """
@@ -68,9 +67,7 @@ class HierarchicalEstimate:
     relative: FloatArray | None = None
     area_bar: float = nan
     at_edge: float = 0.0
-    rest_bar: float = nan
-    rest_force_bar: float = nan
-    rest_slip_bar: float = nan
+    rests: tuple[RestBars, ...] = ()
     friction_bar: float = 0.0
     pull: PullResult | None = None
     shortening_bar: float = nan

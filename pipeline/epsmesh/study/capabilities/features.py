@@ -370,6 +370,12 @@ FEATURES: dict[str, Feature] = {
     "level loose layer": Feature(
         "body.layer", lambda s: s.body.loose is not None and s.body.loose.is_level, where=_contact_of_layer
     ),
+    "loose layer in a grasp": Feature(
+        "body.layer",
+        lambda s: s.body.loose is not None and s.probe.jaw is not None,
+        ("probe",),
+        where=_contact_of_layer,
+    ),
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
     ),

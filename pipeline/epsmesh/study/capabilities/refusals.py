@@ -308,13 +308,14 @@ REFUSALS: tuple[Refusal, ...] = (
         f"is not computed {_OF_LAW}: its nodes would leave those of the tissue below, on which they are. Omit it",
     ),
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
-    Refusal("loose layer", "grasp", "is not computed with two jaws: omit `together`"),
     Refusal("level loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
+    Refusal("loose layer", "pull", "is not computed with jaws that are pulled: omit `pull`"),
     Refusal(
         "loose region",
         "accuracy",
         "has edges of contact anywhere on it, which meshes of an accuracy do not refine: give sizes",
     ),
+    Refusal("loose layer in a grasp", "accuracy", "has no recipe between two jaws: give sizes"),
     Refusal("loose layer", "capsule on the surface", "would be held by the capsule around it: omit one of the two"),
     *(
         Refusal("loose layer that rubs", preloaded, f'must be 0 or "stick" with {what}')
