@@ -157,3 +157,16 @@ def test_what_is_not_computed_is_refused(changes, said):
         {key: value for key, value in layer.items() if value is not None} for layer in content["body"]["layer"]
     ]
     assert said in refusal(content)
+
+
+@pytest.mark.parametrize("friction", [0, "stick"])
+def test_two_jaws_close_on_tissue_that_lies_loose(friction):
+    """If nothing else holds the body, both jaws and the tissue between have one force, less than that of one body."""
+    changes = {"probe": [BALL | {"together": "grasp"}, {"together": "grasp"}], "mesh": ROUGH}
+    found, bonded = (one(body=flap(rubs) | {"fixed": "none"}, **changes) for rubs in (friction, None))
+    assert found.status == "ok", found.message
+    for name in ("jaw_force", "interface_force"):
+        assert found.largest[name] == pytest.approx(found.force, rel=1e-7)
+        assert found.largest[f"{name}_error"] > 0.1 * found.force_error * found.force
+    assert found.largest["lift_off_area"] > 0
+    assert found.force < bonded.force * (1 - 1e-4)

@@ -131,7 +131,7 @@ class LargeContactSolution:
         """Return the whole contact, with the effects of loads."""
         stored = 2.0 ** len(self.body.elements.body.mirrored) * self.sagged.stored
         found = self.surface_contact.result(self.sagged.sag, stored)
-        rests = tuple(rest.result() for rest in self.rests)
+        rests = tuple(rest.result() for rest in self.rests) or found.rests  # or the image of the tool
         found = replace(found, rests=rests, shortening=self.shortening)
         if self.beside is None or not self.beside.pulls:
             return found
