@@ -56,6 +56,7 @@ _OF_SCHEMA = (
     "is not computed along an insertion",
     "has no F_exact",
     "is too large for a tool that deforms",
+    "is not computed in a body in which tissue lies loose",
 )
 
 

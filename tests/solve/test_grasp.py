@@ -166,6 +166,7 @@ def test_a_body_that_jaws_do_not_hold_fails_and_says_along_which_axis():
         (grasp(BALL, {"radius": "80 mm", "depth": "2 mm"}, body={"fixed": "sides"}), "second jaw"),
         (grasp(BALL, {"at": ["1 mm", "0 mm"]}), "probe[2].at"),
         (grasp(BALL, {"depth": ["0.1 mm", "0.2 mm"]}), "sweep it in the first table"),
+        (grasp(BALL, {"young": "5 kPa", "poisson": 0.3}), "probe[2].young"),
         (grasp(BALL, {"shape": "hook"}), "unknown shape"),
         (grasp(BALL, {"shape": "disc"}), "radius"),
         (grasp(BALL, {"colour": "red"}), "unknown key"),

@@ -170,3 +170,19 @@ def test_two_jaws_close_on_tissue_that_lies_loose(friction):
         assert found.largest[f"{name}_error"] > 0.1 * found.force_error * found.force
     assert found.largest["lift_off_area"] > 0
     assert found.force < bonded.force * (1 - 1e-4)
+
+
+def test_an_inclusion_in_a_loose_layer_is_bonded_to_it():
+    lump = {"name": "lump", "at": ["0 mm", "0 mm", "-4 mm"], "axes": ["2 mm", "2 mm", "2 mm"], "young": "90 kPa"}
+    found = one(body=flap("stick") | {"inclusion": [lump | {"poisson": 0.3}]}, mesh=ROUGH)
+    assert found.status == "ok", found.message
+    assert found.largest["interface_area"] == pytest.approx(40e-3**2, rel=1e-9)
+    assert found.largest["interface_force"] == pytest.approx(found.force, rel=1e-8)
+    assert found.force > one(body=flap("stick"), mesh=ROUGH).force
+
+
+def test_a_capsule_beside_loose_tissue_is_refused():
+    capsule = {"young": "1 MPa", "thickness": "0.1 mm"}
+    lump = {"name": "lump", "at": ["0 mm", "0 mm", "-4 mm"], "axes": ["2 mm", "2 mm", "2 mm"], "young": "90 kPa"}
+    body = flap() | {"inclusion": [lump | {"poisson": 0.3, "capsule": capsule}]}
+    assert "omit one of the two" in refusal(raw(probe=BALL, body=body))

@@ -22,6 +22,8 @@ def part_loose(mesh: MeshArrays, loose: Loose) -> MeshArrays:
     """
     assert mesh.regions is not None
     is_upper = np.isin(mesh.regions, loose.parts)
+    if loose.height is not None:
+        is_upper = mesh.points[mesh.cells[:, :4], 2].mean(axis=1) > loose.height
     of_upper, of_lower = (_facets(mesh.cells[chosen]) for chosen in (is_upper, ~is_upper))
     own = facet_keys(of_upper)
     between = of_upper[np.isin(own, facet_keys(of_lower))]

@@ -194,8 +194,10 @@ def has_sure_limit(case: Case) -> bool:
 def is_ball(case: Case) -> bool:
     """Return whether F has the limit of balls; at large displacements not in histories, nor close to a held side."""
     radii = [radius for tool in _tools(case) if (radius := tool.hertz_radius) is not None]
-    if len(radii) < len(_tools(case)) or not case.way.is_nonlinear:
-        return bool(radii)
+    if len(radii) < len(_tools(case)):
+        return False
+    if not case.way.is_nonlinear:
+        return True
     gaps = held_gaps(case.body, case.probe, case.mesh).values()
     return not case.way.in_time and all(gap >= _FROM_HELD * max(radii) for gap in gaps)
 

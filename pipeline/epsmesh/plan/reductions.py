@@ -284,7 +284,8 @@ def _has_lone_depths(operators: list[OperatorStep]) -> bool:
     for solve in (solve for operator in operators for solve in operator.solves):
         case, probe = solve.case, solve.case.probe
         if probe.is_unilateral and probe.jaw is None and any(getattr(probe, key) is None for key in probe.SWEPT):
-            same = repr((case.body, case.tissues, case.mesh, probe.model_dump(exclude={"depth", "history"})))
+            of_tool = probe.height, probe.model_dump(exclude={"depth", "history"})
+            same = repr((case.body, case.tissues, case.mesh, of_tool))
             if same in seen:
                 return True
             seen.add(same)

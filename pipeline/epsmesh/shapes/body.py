@@ -358,10 +358,10 @@ class Layered(Drawn):
     @property
     def loose(self) -> Loose | None:
         """The layer that lies loose, or the region; not the lowest layer, which no tissue is below."""
-        for number, (layer, _) in enumerate(zip(self.layer, self.interfaces, strict=False), start=1):
+        for number, (layer, height) in enumerate(zip(self.layer, self.interfaces, strict=False), start=1):
             if layer.contact != "bonded":
                 parts = tuple(range(1, number + 1))
-                return Loose(layer.name, self.places[number - 1], layer.friction, parts, is_level=True)
+                return Loose(layer.name, self.places[number - 1], layer.friction, parts, height)
         loose = super().loose
         return None if loose is None or loose.place.startswith("layer") else loose
 

@@ -61,14 +61,20 @@ class Loose:
     """A layer that lies loose on the tissue below it, or a region on all that it touches: its ``name``, its ``place``
     in a study, such as layer[2], and Coulomb's coefficient of ``friction``, infinite where it sticks.
 
-    ``parts`` are the numbers in meshes of what lies loose: those of layers above are among them. A layer ``is_level``.
+    ``parts`` are the numbers in meshes of what lies loose: those of layers above are among them. A layer is level: all
+    tissue above its lower end, at the ``height`` z (m), lies loose with it, and what is embedded there, too.
     """
 
     name: str
     place: str
     friction: float
     parts: tuple[int, ...]
-    is_level: bool = False
+    height: float | None = None
+
+    @property
+    def is_level(self) -> bool:
+        """Whether it is a layer."""
+        return self.height is not None
 
 
 class Embedded(Region):

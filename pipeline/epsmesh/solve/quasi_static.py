@@ -87,7 +87,7 @@ class QuasiStaticProblem(Problem):
                 body.
         """
         self.elements: Elements = elements_of(spaces, degree, conditions, element)
-        beds = () if tool is None else tool.beds
+        beds = () if tool is None else tuple(bed for bed in tool.beds if not bed.is_tissue)
         check_hold(self.elements.displacements, [(np.array(bed.normal), bed.drags or bed.sticks) for bed in beds])
         self.constraint: Constraint = PrescribedMotion(self.elements, reuse=reuse)
         if tool is not None:

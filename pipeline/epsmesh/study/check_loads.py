@@ -94,6 +94,9 @@ def _check_loose(body: Body, problems: Problems) -> None:
     loose = body.loose
     for place, piece in zip(body.places, body.regions, strict=True):
         key = f"body.{place}"
+        if loose is not None and isinstance(piece, Embedded) and piece.capsule and place != loose.place:
+            beside = f"is not computed in a body in which tissue lies loose, {loose.name}: omit one of the two"
+            problems.error(f"{key}.capsule", None, beside)
         if piece.contact == "bonded":
             if piece.friction:
                 without = 'is of tissue with contact = "unilateral": what is bonded does not slide. Omit it'

@@ -18,7 +18,7 @@ FOUND_TOGETHER = 'must be "unilateral" in a grasp: the contacts of both jaws are
 # Keys of the first jaw alone: both have the same place, axis and friction.
 _OF_FIRST = (
     "at", "axis", "path", "friction", "history", "insertion", "force", "motion", "action", "mesh_depths",
-    "pull", "pull_direction", "slice", "incision",
+    "pull", "pull_direction", "slice", "incision", "young", "poisson", "height",
 )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from epsmesh.solve.contact.bed import Bed
 from epsmesh.solve.contact.checks import force_of
 from epsmesh.solve.contact.contact_steps import (
     ContactPath,
@@ -30,6 +31,7 @@ from epsmesh.solve.contact.pull import Pull, pull_jaws
 from epsmesh.solve.contact.rest import Rest, height_beside, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.settle import without_friction
+from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution
@@ -58,8 +60,9 @@ class LargeContact:
         self._surface, self._elements, self._tool = surface, elements, tool
         self._law, self._loads = asked.law, asked.movement.loads
         space, is_loaded = elements.displacements, self._loads is not None
-        for bed in tool.beds:
+        for number, bed in enumerate(tool.beds, start=1):
             check_loose(surface, elements.degree, bed)
+            _check_apart(surface.of(elements.degree), number, bed)
         self._smooth = without_friction(space, tool, is_loaded=is_loaded) if tool.rubs else tool
         self._applied = None if self._loads is None else elements.displacements.applied(self._loads)
         self._sagged: Sagged | None = None
@@ -149,6 +152,22 @@ class LargeContact:
             fewest = steps // _OF_SETTLING
             self._settled[steps] = sagged_body(smooth.body, self._tool, self._loads, friction=friction, steps=fewest)
         return self._settled[steps]
+
+
+def _check_apart(candidates: Candidates, number: int, bed: Bed) -> None:
+    """Check that what a tool may touch ends before the border of the loose tissue on a ``bed`` with this ``number``.
+
+    Raises:
+        LargeError: if they share nodes.
+    """
+    if bed.tissue is None or candidates.contacts is None:
+        return
+    others = np.unique(candidates.facets[candidates.contacts != number])
+    if len(np.intersect1d(others, candidates.facets[candidates.contacts == number])):
+        raise LargeError(
+            f'the tissue that a tool may touch reaches the border of "{bed.tissue.name}", which lies loose: there one '
+            "place has two contacts. Move the tool, or use a smaller depth or tool"
+        )
 
 
 def stopped(

@@ -221,7 +221,10 @@ def pairs_of(
     if len(np.unique(nearest)) < len(upper) or away.max(initial=0.0) > _SAME * float(np.ptp(points, axis=0).max()):
         raise SolveError("two surfaces that touch have different nodes")
     of_upper = Numbering(space, candidates.numbers[upper])
+    of_lower = Numbering(space, numbers[nearest])
     free = of_upper.gather_vectors(is_free)
+    if (free < of_lower.gather_vectors(is_free)).any():
+        raise SolveError("the support ends where loose tissue begins: let it hold tissue on both sides, or end before")
     normals = normal(of_upper, free)
     frames = turned_frames(normals, free.any(axis=1))
-    return Pairs(of_upper, Numbering(space, numbers[nearest]), free, upper, normals, frames, np.ones_like(free))
+    return Pairs(of_upper, of_lower, free, upper, normals, frames, np.ones_like(free))
