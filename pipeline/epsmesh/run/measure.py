@@ -155,7 +155,12 @@ def _of_others(case: Case, solution: Solution, bar: float) -> dict[str, float]:
     if case.probe.elastic:
         found |= {"tool_shortening": contact.shortening, "tool_shortening_error": contact.shortening_bar}
     for name, rest in zip(beds_on(case), contact.rests, strict=True):
-        found |= _of_jaw(case, rest) if name == JAW else _of_tissue(case, rest) if name == LOOSE else of_rest(solution)
+        if name == JAW:
+            found |= _of_jaw(case, rest)
+        elif name == LOOSE:
+            found |= _of_tissue(case, rest)
+        else:
+            found |= _of_support(rest, solution.reaction_bars)
     return found
 
 
@@ -204,16 +209,12 @@ def _of_pull(pull: PullResult | None, bar: float) -> dict[str, float]:
     return found
 
 
-def of_rest(solution: Solution) -> dict[str, float]:
+def _of_support(rest: RestResult, bars: Vector) -> dict[str, float]:
     """Return what a record has of a support that lets go, by the names in the dataset.
 
-    Its force differs from that of the tool by the weight of the body, and has the same error.
+    Its force differs from that of the tool by the weight of the body, and has the same error: ``bars`` (3), N.
     """
-    contact = solution.contact
-    if contact is None or not contact.rests:
-        return {}
-    rest, *_ = contact.rests
-    across = zip(rest.normal, rest.force, solution.reaction_bars, strict=True)
+    across = zip(rest.normal, rest.force, bars, strict=True)
     parts = [(n * f, abs(n) * bar) for n, f, bar in across if abs(n) > _ROUNDING]
     return {
         "support_force": sum(force for force, _ in parts),
