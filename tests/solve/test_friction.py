@@ -10,7 +10,8 @@ from epsmesh.run.meshing import mesh_case
 from epsmesh.run.problem import law_of, movement_of
 from epsmesh.run.tools import tool_of
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT
-from epsmesh.solve.contact.surface import Candidates, facet_nodes
+from epsmesh.solve.contact.facets import facet_nodes
+from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.quasi_static import QuasiStaticProblem
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.problems import StudyError

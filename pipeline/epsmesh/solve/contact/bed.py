@@ -90,17 +90,20 @@ class Bed:
         """How far (3), m, it goes where the tool goes 1 m."""
         return self.pace * np.array(self.normal)
 
-    def at_rest(self, places: FloatArray, normals: FloatArray | None = None) -> "Bed":
+    def beside_tissue(self, places: FloatArray, normals: Callable[[], FloatArray]) -> "Bed":
+        """Return tissue as a bed: gaps are those of nodes to their partners, zero at ``places`` (n, 3), along its
+        current ``normals`` (n, 3)."""
+        nothing = np.zeros(len(places))
+        return replace(self, distance=lambda points, _: Distance.along(-normals(), nothing, points - places))
+
+    def at_rest(self, places: FloatArray) -> "Bed":
         """Return the bed of linear elasticity: gaps are those above ``places`` (n, 3) at rest, along its axis.
 
-        Of a jaw that is inclined to the surface, they are along the surface's normal. Those to tissue are along the
-        ``normals`` (n, 3) of its nodes, and zero at rest.
+        Of a jaw that is inclined to the surface, they are along the surface's normal.
         """
         if self.touched is not None:
             return replace(self, distance=above_places(self.distance, np.array(self.touched), places))
         heights, outward = self.height(places), -np.array(self.normal)
-        if self.is_tissue and normals is not None:
-            outward = -normals
         return replace(
             self,
             distance=lambda points, depth: Distance.along(outward, heights - self.pace * depth, points - places),
@@ -162,14 +165,15 @@ def tissue_below(tissue: LooseTissue, friction: float, *, is_level: bool) -> Bed
 class Resting:
     """The ``nodes`` (n) above beds, among all that may be touched; those that touch at the start of a path, ``begin``.
 
-    In a loop without friction, those that ``stick`` (n) are held at ``anchors`` (n, 3), m, where they touch. ``jaws``
-    are masks (n) of those of each second jaw. Of ``holds`` (n), masks, each has a node that touches, or the body
-    floats: nothing else holds it.
+    In a loop without friction, those that ``stick`` (n) are held at ``anchors`` (n, 3), m, where they touch. Where sets
+    repeat, they may penetrate ``yielding`` times as much as before. ``jaws`` are masks (n) of those of each second jaw.
+    Of ``holds`` (n), masks, each has a node that touches, or the body floats: nothing else holds it.
     """
 
     nodes: BoolArray
     begin: BoolArray
     stick: BoolArray
     anchors: FloatArray
+    yielding: float
     jaws: tuple[BoolArray, ...] = ()
     holds: tuple[BoolArray, ...] = ()

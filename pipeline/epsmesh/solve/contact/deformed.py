@@ -143,7 +143,8 @@ class _InContact(Newton[ContactSolution]):
         self._place, self._there = _placed(tissue, tool)
         normal, forces = self._there.normal, tissue.forces()
         is_first = self._is_guess and iteration == 0
-        following = before if is_first else _next_set(tool, before, self._reactions, self._place.gap)
+        slack = tool.slack_of(self._repeats)
+        following = before if is_first else _next_set(tool, before, self._reactions, self._place.gap, slack)
         along = np.einsum("ni,ni->n", forces, normal)
         if iteration and self._is_refuted(before, following, along):
             self._refuted.add(before.tobytes())
@@ -322,10 +323,12 @@ def _constraint(place: Distance, normal: FloatArray, pressed: FloatArray, active
     return Constraint(turned_frames(normal, active), held, values, turning, np.zeros(normal.shape))
 
 
-def _next_set(tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: FloatArray) -> BoolArray:
-    """Return active nodes under pressure, and inactive nodes that penetrate the tool."""
+def _next_set(
+    tool: PlacedTool, active: BoolArray, reactions: FloatArray, gap: FloatArray, slack: float | FloatArray
+) -> BoolArray:
+    """Return active nodes under pressure, and inactive nodes that penetrate the tool by more than the ``slack`` (m)."""
     pull = -SLACK * float(np.abs(reactions[active]).mean()) if active.any() else 0.0
-    following = np.where(active, reactions > pull, gap < -tool.slack)
+    following = np.where(active, reactions > pull, gap < -slack)
     return tool.complete(following)
 
 

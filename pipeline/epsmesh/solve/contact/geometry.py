@@ -16,7 +16,8 @@ import numpy as np
 from epsmesh import fitted
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.solve.contact.elements import FreeResponse
-from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates
+from epsmesh.solve.contact.facets import FACET_CORNERS
+from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.touching import ContactSolution
 
 # Search for the first touch: sampling points along an edge of each facet, rounds of refinement, the factor by which a

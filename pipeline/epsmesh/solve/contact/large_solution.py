@@ -32,7 +32,7 @@ from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import check_edges, placed_tool
 from epsmesh.solve.contact.pull import Pull, with_bars
-from epsmesh.solve.contact.rest import Rest, force_left, rests_of
+from epsmesh.solve.contact.rest import Rest, force_left, overlap, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -51,6 +51,8 @@ from epsmesh.stages import stage
 _SMALL = 1e-4
 # Residual and gaps of one degree more, for the error bar.
 _FOUND_AGAIN = 1e-3
+# Depth of tissue within that below it which is an error, in units of the tool's depth.
+_OVERLAPS = 0.05
 # Share of the depth to both sides of it over which the rate by the depth is taken.
 _NEARBY = 1e-3
 
@@ -141,12 +143,16 @@ class LargeContactSolution:
         """Check the work, and that contact ends within the candidates.
 
         Raises:
-            LargeError: if the work of the reactions is not the change of the energy.
+            LargeError: if the work of the reactions is not the change of the energy, or loose tissue has gone far.
             ContactError: if contact reaches the support or the edge of the candidates.
         """
         tool = self.body.part()
         check_support(tool.of(self.body.fixed), tool.of(self.touched.gap))
         check_edges(self.body, self.tool, self.touched)
+        if not self.body.law.is_linear and overlap(self.body, self.tool.beds, self.touched) > _OVERLAPS * self.depth:
+            raise LargeError(
+                "tissue that has lifted off the tissue below comes to another place of it: use a smaller depth"
+            )
         check_energy(self.body, self.touched, _SMALL)
 
     def response(self, movement: Movement) -> Response:

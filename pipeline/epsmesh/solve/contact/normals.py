@@ -4,7 +4,8 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray, IntArray
 from epsmesh.solve import SolveError
-from epsmesh.solve.contact.surface import FACET_CORNERS, Candidates, FacetNodes
+from epsmesh.solve.contact.facets import FACET_CORNERS, FacetNodes
+from epsmesh.solve.contact.surface import Candidates
 
 # Shares of a uniform pressure below this are rounding.
 _NOTHING = 1e-9
@@ -32,6 +33,21 @@ def nodal_normals(candidates: Candidates, pressed: FloatArray, means: FloatArray
     normal = np.where(bears[:, None], signs[:, None] * pressed, around)
     normal = np.where(free.any(axis=1)[:, None], free * normal, normal)
     return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
+
+
+def deformed_normals(candidates: Candidates, points: FloatArray, at_rest: FloatArray, free: FloatArray) -> FloatArray:
+    """Return unit normals (n, 3) of the facets of ``candidates`` whose nodes are at ``points`` (n, 3), m.
+
+    They are means of the facets around a node, on the side of the normals ``at_rest`` (n, 3). Components that are not
+    ``free`` (n, 3) are 0: those across planes of symmetry.
+    """
+    facets, shape = candidates.facets, candidates.shape
+    before, now = (shape.normals(places[facets]) for places in (candidates.points, points))
+    side = np.sign(np.einsum("mki,mki->m", before, at_rest[facets]))
+    found = np.zeros_like(points)
+    np.add.at(found, facets, side[:, None, None] * now)
+    found = np.where(free.any(axis=1)[:, None], free * found, found)
+    return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
 
 
 def means_of(facets: IntArray, normals: FloatArray) -> FloatArray:

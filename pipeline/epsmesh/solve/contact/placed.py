@@ -1,10 +1,12 @@
 """All that touches a body at one depth of the tool: the tool, and what the body rests on or is held by besides."""
 
+from functools import partial
+
 import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
-from epsmesh.solve.contact.bed import Resting
+from epsmesh.solve.contact.bed import Bed, Resting
 from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
@@ -12,6 +14,9 @@ from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 
 # Height below which nodes of a support touch it at first, in units of the depth.
 _NEXT = 0.5
+# Between tissues that both strain much, a node that returns may penetrate freely, and pull where it stuck before: no
+# set has neither. It may then penetrate so many times as much.
+_YIELDING = 10.0
 
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
@@ -41,11 +46,16 @@ def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None
 
     if not tool.beds:
         return PlacedTool(of_tool, complete, neighbours.followers, depth)
-    beds = tool.beds
-    if body.law.is_linear:
-        places = [body.part(n).candidates.points for n, _ in enumerate(tool.beds, start=1)]
-        beds = tuple(bed.at_rest(at, body.normals_between) for bed, at in zip(beds, places, strict=True))
+    beds = tuple(_of_law(body, number, bed) for number, bed in enumerate(tool.beds, start=1))
     return PlacedTool(distance, complete, neighbours.followers, depth, _resting(body, tool, depth))
+
+
+def _of_law(body: DeformedBody, number: int, bed: Bed) -> Bed:
+    """Return a ``bed`` with the gaps of the law of a ``body``, at the nodes of the contact with this ``number``."""
+    part = body.part(number)
+    if bed.is_tissue:
+        return bed.beside_tissue(part.of(body.places), partial(body.normals_on, number))
+    return bed.at_rest(part.candidates.points) if body.law.is_linear else bed
 
 
 def check_edges(body: DeformedBody, tool: Tool, touched: ContactSolution) -> None:
@@ -75,4 +85,5 @@ def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
             begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth
     holds = () if body.is_held else (*supports, *((*jaws, ~nodes) if jaws else ()))
     begin = begin if tool.begins is None else tool.begins
-    return Resting(nodes, begin, stick, body.places, tuple(jaws), holds)
+    is_soft = not body.law.is_linear and any(bed.is_tissue for bed in tool.beds)
+    return Resting(nodes, begin, stick, body.places, _YIELDING if is_soft else 1.0, tuple(jaws), holds)

@@ -6,6 +6,7 @@ from functools import cached_property
 from math import nan
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
@@ -184,7 +185,7 @@ def rests_of(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) 
     for number, bed in enumerate(beds, start=1):
         part = body.part(number)
         candidates = part.candidates
-        if not body.law.is_linear:
+        if not (body.law.is_linear or bed.is_tissue):  # areas between tissue are those at rest
             candidates = replace(candidates, points=part.of(body.positions()))
         modulus, moved = candidates.from_regions(body.law.plane_moduli), part.of(body.positions() - body.places)
         found.append(Rest(bed, candidates, part.solution(touched), modulus, moved, body.elements.body.mirrored))
@@ -205,6 +206,24 @@ def force_left(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution
     left = held - body.on_terms + forces.sum(axis=0)
     left[list(body.elements.body.mirrored)] = 0.0
     return np.asarray(left)
+
+
+def overlap(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -> float:
+    """Return how far (m) loose tissue that has lifted off is within that below, beyond its own gaps; collective.
+
+    Gaps are those of nodes to their partners: tissue that has gone far along may have come to another place. They are
+    compared with those above the plane of the nearest node below.
+    """
+    found = 0.0
+    for number, bed in enumerate(beds, start=1):
+        if bed.is_tissue:
+            part, below, normals = body.part(number), body.below(number), body.normals_on(number)
+            is_open, gap = ~part.of(touched.active), part.of(touched.gap)
+            upper = below + part.of(body.positions() - body.places)
+            nearest = cKDTree(below).query(upper)[1]
+            above = np.einsum("ni,ni->n", upper - below[nearest], normals[nearest])
+            found = max(found, float((np.minimum(gap, 0.0) - above)[is_open].max(initial=0.0)))
+    return found
 
 
 def height_beside(body: DeformedBody, beds: Sequence[Bed]) -> float:

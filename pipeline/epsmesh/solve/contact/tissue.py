@@ -13,6 +13,7 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.deformed import LEFT
 from epsmesh.solve.contact.levels import Surface
+from epsmesh.solve.contact.normals import deformed_normals
 from epsmesh.solve.contact.numbering import Numbering
 from epsmesh.solve.contact.parts import TOOL, Part, part_of
 from epsmesh.solve.contact.surface import Candidates
@@ -180,10 +181,24 @@ class DeformedBody:
         """The nodes' places (n, 3) at rest, in m."""
         return self._places
 
-    @property
-    def normals_between(self) -> FloatArray | None:
-        """The unit normals (n, 3) into loose tissue at its nodes; None without any."""
-        return None if self._pairs is None else self._pairs.normal
+    def normals_on(self, number: int) -> FloatArray:
+        """Return unit normals (n, 3) into loose tissue at the nodes of the contact with this ``number``; collective.
+
+        With a linear law they are those at rest, else those of the tissue below in its state.
+        """
+        assert self._pairs is not None
+        part, (at_rest, free) = self.part(number), np.zeros((2, *self.fixed.shape))
+        at_rest[self._pairs.nodes], free[self._pairs.nodes] = self._pairs.normal, self._pairs.free
+        if self.law.is_linear:
+            return np.asarray(part.of(at_rest))
+        return deformed_normals(part.candidates, self.below(number), part.of(at_rest), part.of(free))
+
+    def below(self, number: int) -> FloatArray:
+        """Return where (n, 3), m, the tissue below is to which nodes of the contact with this ``number`` belong."""
+        found = self.places.copy()
+        if self._pairs is not None:
+            found[self._pairs.nodes] += self._pairs.lower.gather_vectors(self._now.array[: self._space.owned])
+        return np.asarray(self.part(number).of(found))
 
     # ---- results ----------------------------------------------------------------------------------------
 

@@ -18,6 +18,8 @@ SLACK = 1e-6
 # The same for penetration of nodes that stick where they touch: one that leaves carries forces along the bed, too, and
 # sets of nodes that hardly press would follow each other forever.
 _STICKING = 1e-3
+# Sets repeat if one is solved so often.
+_REPEATED = 2
 
 
 class Tissue(Moving, Protocol):
@@ -83,6 +85,12 @@ class PlacedTool:
         """The penetration (m) that is solver error, of all or of each node (n)."""
         least = SLACK * self.depth
         return least if self.resting is None else np.where(self.resting.stick, _STICKING * self.depth, least)
+
+    def slack_of(self, repeats: int) -> float | FloatArray:
+        """Return the same where the active set repeats for the so-manieth time."""
+        if self.resting is None or repeats < _REPEATED:
+            return self.slack
+        return np.where(self.resting.stick, self.resting.yielding, 1.0) * self.slack
 
     def start(self) -> BoolArray:
         """Return the nodes (n) that touch at the start of a path."""
