@@ -1,5 +1,6 @@
 """An accuracy for bodies with two contacts: the meshes that are chosen, bars against finer meshes, and balances."""
 
+from functools import lru_cache
 from typing import Any
 
 import pytest
@@ -10,8 +11,8 @@ from epsmesh.run.execute import compute
 from epsmesh.study.read import parse
 from tests.cases import NO_SIZES, raw, refusal
 
-ASKED = 0.01
 MESH = NO_SIZES | {"accuracy": "1 %"}
+ROUGH = NO_SIZES | {"accuracy": "2 %"}
 FINER = {"rim": "0.3 mm", "growth": 0.5, "fine": "5 mm", "degree": 3}
 DISC: dict[str, Any] = {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm", "contact": "unilateral"}
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.3 mm", "contact": "unilateral"}
@@ -41,7 +42,7 @@ def solved(content: dict[str, Any], comm: MPI.Comm = MPI.COMM_SELF) -> Any:
 
 SCENES = {
     "balls": scene(SLICE, jaws(BALL, {})),
-    "a ball and a disc": scene(SLICE, jaws(BALL, {"shape": "disc", "radius": "3 mm"})),
+    "a ball and a disc": scene(SLICE, jaws(BALL, {"shape": "disc", "radius": "3 mm"}), mesh=ROUGH),
     "discs that differ": scene(SLICE | {"fixed": "sides"}, jaws(DISC, {"radius": "4 mm"})),
     "a ball on a table": scene(SLICE | {"support": TABLE}, BALL),
     "a disc on a table": scene(SLICE | {"support": TABLE}, DISC),
@@ -49,11 +50,17 @@ SCENES = {
 }
 
 
+@lru_cache
+def solved_once(name: str) -> Any:
+    """Return the record of one of the scenes."""
+    return solved(SCENES[name])
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_the_accuracy_is_reached_and_a_finer_mesh_agrees_within_the_bar(name):
     content = SCENES[name]
-    found, finer = solved(content), solved(content | {"mesh": content["mesh"] | {"accuracy": None} | FINER})
-    assert found.force_error <= ASKED
+    found, finer = solved_once(name), solved(content | {"mesh": content["mesh"] | {"accuracy": None} | FINER})
+    assert found.force_error <= float(content["mesh"]["accuracy"].removesuffix(" %")) / 100
     assert abs(found.force / finer.force - 1) <= found.force_error + finer.force_error
     for other in ("jaw_force", "support_force", "interface_force"):
         if other in found.largest:
@@ -65,7 +72,7 @@ def test_the_accuracy_is_reached_and_a_finer_mesh_agrees_within_the_bar(name):
     ("name", "other"), [("a ball and a disc", "jaw_force"), ("a disc on a table", "support_force")]
 )
 def test_what_carries_the_force_of_the_tool_alone_has_its_limit_and_its_bar(name, other):
-    found = solved(SCENES[name])
+    found = solved_once(name)
     assert found.largest[other] == pytest.approx(found.force, rel=1e-7)
     assert found.largest[f"{other}_error"] == pytest.approx(found.force_error * found.force, rel=1e-6)
 
@@ -84,5 +91,6 @@ def test_a_pull_is_refused():
 
 @pytest.mark.mpi
 def test_ranks_agree():
-    alone, both = (solved(SCENES["a ball and a disc"], comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
+    content = scene(SLICE, jaws(BALL, {"shape": "disc", "radius": "3 mm"}), mesh=NO_SIZES | {"accuracy": "4 %"})
+    alone, both = (solved(content, comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
     assert both.force == pytest.approx(alone.force, rel=1e-6)
