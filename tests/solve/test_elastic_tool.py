@@ -15,6 +15,8 @@ from tests.cases import NO_SIZES, raw, refusal, solve, study
 
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm", "contact": "unilateral"}
 SOFT: dict[str, Any] = BALL | {"young": "30 kPa", "poisson": 0.3}
+WEDGE: dict[str, Any] = SOFT | {"shape": "wedge", "angle": "60 deg", "length": "10 mm", "tip": "2 mm", "height": "4 mm"}
+del WEDGE["radius"]
 MESH = {"fine": "4 mm", "coarse": "12 mm", "rim": "0.3 mm"}
 # Contact of a hundredth of the radius, on a body of 200 contact radii: two elastic half-spaces.
 FLAT: dict[str, Any] = {
@@ -59,6 +61,20 @@ def test_a_stiff_tool_is_rigid():
     assert stiff.largest["max_strain"] == pytest.approx(rigid.largest["max_strain"], rel=0.1)
 
 
+@pytest.mark.parametrize(
+    "turned",
+    [{}, pytest.param({"direction": [0.6, 0.8, 0.0], "at": ["4 mm", "2 mm"]}, marks=pytest.mark.nightly)],
+    ids=["along x", "turned"],
+)
+def test_a_stiff_wedge_is_rigid(turned):
+    """Its ends are sharp: the forces below them converge slowly, and alike."""
+    keys = {key: WEDGE[key] for key in WEDGE if key not in ("young", "poisson", "height")}
+    rough = MESH | {"rim": "0.6 mm", "growth": 1.0}
+    rigid, stiff = (one(probe=keys | turned | more, mesh=rough) for more in ({}, {"young": "1 GPa", "poisson": 0.3}))
+    assert abs(stiff.force - rigid.force) < stiff.force * stiff.force_error + rigid.force * rigid.force_error
+    assert stiff.force == pytest.approx(rigid.force, rel=0.02)
+
+
 def test_a_softer_tool_presses_less():
     forces = [one(probe=SOFT | {"young": young}).force for young in ("3 kPa", "30 kPa", "300 kPa")]
     assert forces == sorted(forces)
@@ -78,8 +94,9 @@ def test_what_acts_on_the_tool_acts_on_tissue_and_mount(changes):
         pytest.param(SOFT | {"height": "3 mm"}, marks=pytest.mark.nightly),
         pytest.param(SOFT | {"shape": "disc", "edge": "1 mm", "depth": "0.1 mm"}, marks=pytest.mark.nightly),
         SOFT | {"shape": "cone", "angle": "75 deg"},
+        pytest.param(WEDGE, marks=pytest.mark.nightly),
     ],
-    ids=["ball", "incompressible", "low", "disc", "cone"],
+    ids=["ball", "incompressible", "low", "disc", "cone", "wedge"],
 )
 def test_the_bars_cover_a_finer_mesh(probe):
     coarse, fine = (one(probe=probe, mesh=MESH | sizes) for sizes in ({}, {"rim": "0.12 mm", "fine": "2.5 mm"}))
@@ -101,17 +118,17 @@ def test_the_work_of_the_tool_is_the_energy_of_tissue_and_tool():
     assert work == pytest.approx(found[-1].energy, rel=0.01)
 
 
-@pytest.mark.parametrize("degree", [2, 3])
-def test_a_pressure_along_the_axis_has_the_same_nodal_forces_on_both_faces(degree):
+@pytest.mark.parametrize(("degree", "probe"), [(2, SOFT), (3, SOFT), (2, WEDGE)])
+def test_a_pressure_along_the_axis_has_the_same_nodal_forces_on_both_faces(degree, probe):
     """A patch test of the coupling: nodes, and shares of a uniform pressure, are above each other."""
-    case = study(probe=SOFT, mesh=MESH).case(())
+    case = study(probe=probe, mesh=MESH).case(())
     body = distribute(MPI.COMM_SELF, mesh_arrays(case, ("x", "y")))
     on_tissue, on_tool = (find_candidates(body, vector_space(body.mesh, degree), groups=(g,)) for g in (PROBE, TOOL))
     tissue, tool = (np.lexsort(np.round(found.points[:, :2].T, 12)) for found in (on_tissue, on_tool))
     assert on_tool.points[tool, :2] == pytest.approx(on_tissue.points[tissue, :2], abs=1e-15)
     assert on_tool.weights[tool] == pytest.approx(on_tissue.weights[tissue], abs=1e-12 * on_tissue.weights.max())
-    beside = np.hypot(*on_tool.points[:, :2].T)
-    assert on_tool.points[:, 2] == pytest.approx(5e-3 - np.sqrt(5e-3**2 - beside**2), abs=1e-6)
+    height = case.probe.profile(on_tool.points[:, :2])
+    assert on_tool.points[:, 2] == pytest.approx(height, abs=1e-6)
 
 
 SKIN = {"name": "skin", "thickness": "6 mm", "young": "30 kPa", "poisson": 0.3}
@@ -174,6 +191,8 @@ def test_its_keys_are_dimensions_of_their_own():
         ({"probe": SOFT | {"height": "0.5 mm"}}, "must be at least 0.98"),
         ({"probe": SOFT | {"depth": "2.5 mm"}}, "its side is steep"),
         ({"probe": SOFT | {"shape": "disc"}}, "is rigid"),
+        ({"probe": WEDGE | {"edge": "0.5 mm"}}, "flat ends"),
+        ({"probe": WEDGE | {"angle": "20 deg", "depth": "2.5 mm"}}, "its side is steep"),
         ({"probe": SOFT | {"shape": "paraboloid", "shaft": "4 mm"}}, "is rigid"),
         ({"probe": SOFT, "material": {"law": "neo-hookean"}}, "a law of large displacements"),
         ({"probe": SOFT | {"axis": [0.1, 0.0, -1.0]}}, "at right angles"),

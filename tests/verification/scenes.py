@@ -31,6 +31,7 @@ COLUMNS = ("scene", "path", *WORDS, "further", "reference", "value", "bar", "sou
 _SHAFT = Kind("neo-hookean", further=("insertion",))
 _OTHERS = {
     "strip on a rigid base, wedge": Kind("linear", "unilateral", "box", "wedge"),
+    "steel roller on aluminium": Kind("linear", "unilateral", "box", "wedge", ("terms",)),
     "crack in a strip": Kind("linear", "bonded", "box", "blade", ("slit",)),
     "ball with a capsule in a ball": Kind(),
     "plane strain": _SHAFT,

@@ -22,13 +22,14 @@ from tests.verification.needles import needle_rows
 from tests.verification.paths import path_rows
 from tests.verification.regions import region_rows
 from tests.verification.relaxation import relaxation_rows
+from tests.verification.rollers import roller_rows
 from tests.verification.slits import slit_rows
 from tests.verification.wedges import wedge_rows
 
 _OF_SCENES = (
     scene_rows, region_rows, body_rows, contact_rows, wedge_rows, slit_rows, insertion_rows, needle_rows,
     far_field_rows, path_rows, load_rows, hyperelastic_rows, relaxation_rows, layer_rows, capsule_rows,
-    compliance_rows, contacts_rows,
+    compliance_rows, contacts_rows, roller_rows,
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from epsmesh import cli, verify
 from epsmesh.verify import Row
-from tests.verification import known, table
+from tests.verification import known, rollers, table
 from tests.verification.bodies import body_rows
 from tests.verification.boundary import rectangle_stiffness
 from tests.verification.capsules import capsule_rows
@@ -70,3 +70,19 @@ def test_command_fails_if_a_row_is_out(monkeypatch):
         assert ("1 out" in result.output) == bool(status)
         told = json.loads(CliRunner().invoke(cli.app, ["verify", "--json"]).stdout)
         assert [row["right"] for row in told] == [True, False][: len(few)]
+
+
+def test_a_roller_on_a_block_is_hertzian():
+    """On a coarse mesh, its width and pressure are within its bars of those of two half-spaces in plane strain."""
+    found = rollers.pressed(MPI.COMM_SELF, {"rim": 0.8, "growth": 0.8})
+    half, pressure = rollers.hertz(found.load)
+    assert found.load == pytest.approx(rollers.LOAD, rel=found.load_bar)
+    assert abs(found.half / half - 1) < found.half_bar + 5e-3 < 0.05
+    assert found.pressure == pytest.approx(pressure, rel=0.03)
+
+
+@pytest.mark.nightly
+def test_rows_of_the_roller_are_within_half_a_per_cent():
+    found = list(rollers.roller_rows(MPI.COMM_SELF))
+    assert len(found) == 3
+    assert all(row.is_right and abs(row.error) < 5.5e-3 for row in found)

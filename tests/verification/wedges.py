@@ -12,7 +12,7 @@ from epsmesh.mesh.generate import MeshArrays
 from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.run.meshing import on_first_rank
 from epsmesh.run.problem import problem_of, solve_problem
-from epsmesh.scene.model import FREE, MIRROR
+from epsmesh.scene.model import FLANK, FREE, MIRROR
 from epsmesh.solve.spaces import Spaces
 from epsmesh.study.case import Case
 from epsmesh.study.read import parse
@@ -44,7 +44,7 @@ def strip(comm: MPI.Comm, thick: float, poisson: float) -> tuple[float, float, f
     """
     depth, share = layer_wedge(1 / tan(radians(_ANGLE)), _HALF, thick * _HALF, poisson)
     case = _case(thick, depth, poisson)
-    body = distribute(comm, on_first_rank(comm, lambda: _held_apart(mesh_arrays(case, _QUARTER))))
+    body = distribute(comm, on_first_rank(comm, lambda: held_apart(mesh_arrays(case, _QUARTER), _LENGTH)))
     with Spaces(body) as spaces, problem_of(spaces, case) as problem:
         found = solve_problem(case, problem, estimate=True)
     return _YOUNG / (1 - poisson**2) * share, found.reaction[2] / _LENGTH, found.bar
@@ -60,9 +60,11 @@ def _case(thick: float, depth: float, poisson: float) -> Case:
     return replace(case, probe=case.probe.model_copy(update={"length": _LENGTH}))
 
 
-def _held_apart(arrays: MeshArrays) -> MeshArrays:
-    """Return the quarter mesh with its end as another plane of symmetry."""
-    free, plane = arrays.facets[FREE], MIRROR["x"]
-    at_end = np.isclose(arrays.points[free][..., 0], _LENGTH / 2, rtol=1e-6).all(axis=1)
-    facets = {FREE: free[~at_end], plane: np.vstack([arrays.facets[plane], free[at_end]])}
-    return replace(arrays, facets=arrays.facets | facets)
+def held_apart(arrays: MeshArrays, length: float) -> MeshArrays:
+    """Return the quarter mesh of a body of this ``length`` (m) with its end as another plane of symmetry."""
+    plane, facets = MIRROR["x"], dict(arrays.facets)
+    for name in {FREE, FLANK} & {*facets}:
+        at_end = np.isclose(arrays.points[facets[name]][..., 0], length / 2, rtol=1e-6).all(axis=1)
+        facets[plane] = np.vstack([facets[plane], facets[name][at_end]])
+        facets[name] = facets[name][~at_end]
+    return replace(arrays, facets=facets)

@@ -34,7 +34,8 @@ def part_tool(mesh: MeshArrays, scene: Scene) -> MeshArrays:
     parted = replace(mesh, points=np.vstack([mesh.points, mesh.points[doubled]]), cells=cells)
     used, face = np.unique(cells[of_tool]), twin[doubled]
     local = tip.bulged(frame.local(parted.points[used]))
-    side = np.isin(used, np.setdiff1d(_nodes(parted, facets[FLANK]), face))
+    flank = facets[FLANK][~tip.ends_at(frame.local(parted.points[facets[FLANK]].mean(axis=1)))]
+    side = np.isin(used, np.setdiff1d(_nodes(parted, flank), face))
     off = tip.distance(local[side])
     local[side] -= off.gap[:, None] * off.normal
     points = parted.points.copy()

@@ -21,18 +21,33 @@ def draw_tip(tip: Tip, frame: Frame, units: Units) -> Tag:
     x, y, z = map(units, frame.point)
 
     def point(beside: float, height: float) -> int:
+        if tip.length:
+            return int(occ.addPoint(x - units(tip.length) / 2, y + units(beside), z + units(height)))
         return int(occ.addPoint(x + units(beside), y, z + units(height)))
 
-    first, last = point(0.0, 0.0), point(0.0, corners[-1][1])
-    points = [point(*corner) for corner in corners]
-    lines = [occ.addLine(first, points[0])]
-    for (start, end), (corner, _) in zip(pairwise(points), pairwise(corners), strict=True):
-        is_arc = corner[0] < tip.rounding_ends
-        lines.append(occ.addCircleArc(start, point(*tip.centre), end) if is_arc else occ.addLine(start, end))
-    lines += [occ.addLine(points[-1], last), occ.addLine(last, first)]
+    def flank(side: int) -> tuple[list[int], list[int]]:
+        """Return the points and the lines of one side, from the face upwards."""
+        points, lines = [point(side * beside, height) for beside, height in corners], []
+        for (start, end), (corner, _) in zip(pairwise(points), pairwise(corners), strict=True):
+            is_arc, (beside, height) = corner[0] < tip.rounding_ends, tip.centre
+            lines.append(
+                occ.addCircleArc(start, point(side * beside, height), end) if is_arc else occ.addLine(start, end)
+            )
+        return points, lines
+
+    if tip.length:
+        (points, lines), (others, beyond) = flank(1), flank(-1)
+        lines = [*lines, occ.addLine(points[-1], others[-1]), *reversed(beyond), occ.addLine(others[0], points[0])]
+    else:
+        first, last = point(0.0, 0.0), point(0.0, corners[-1][1])
+        points, lines = flank(1)
+        lines = [occ.addLine(first, points[0]), *lines, occ.addLine(points[-1], last), occ.addLine(last, first)]
     face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
-    turned = occ.revolve([(2, face)], x, y, z, 0, 0, 1, 2 * pi)
-    (volume,) = (tag for tag in turned if tag[0] == 3)
+    if tip.length:
+        swept = occ.extrude([(2, face)], units(tip.length), 0, 0)
+    else:
+        swept = occ.revolve([(2, face)], x, y, z, 0, 0, 1, 2 * pi)
+    (volume,) = (tag for tag in swept if tag[0] == 3)
     occ.remove([(2, face)], recursive=True)
     frame.place(occ, [volume], units)
     return volume

@@ -32,7 +32,7 @@ class Deformable(Section):
         Words(
             "Height of the part of the tool that deforms, above its lowest point. A stiff mount holds its upper end.",
             '"5 mm"',
-            default="the radius of the tool",
+            default="the radius of the tool, or half the length of its edge",
         ),
     ] = None
 

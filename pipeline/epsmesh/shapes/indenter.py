@@ -200,6 +200,16 @@ class Indenter(Probe):
         """Distance (m) from the expected edge of contact to that of the candidates."""
         return self.footprint.half_width - self.edge_band[1]
 
+    def check_tip(self, problems: Problems) -> None:
+        """Report the keys of a tool that deforms, and a depth at which its side is steep where contact ends."""
+        super().check_tip(problems)
+        flat, (_, widest), tip = self.section.flat, self.contact_widths, self.tip_shape
+        if tip and flat + BAND * (widest - flat) > tip.face and self.force is None:
+            told = (
+                "is too large for a tool that deforms: its side is steep where contact ends. Omit `young`, or use less"
+            )
+            problems.error("probe.depth", in_mm(self.depths[1]), told)
+
     def check(self, problems: Problems) -> None:
         """Report a depth outside the range of the mesh."""
         least, largest = self.depths

@@ -9,13 +9,12 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.contour import Contour
 from epsmesh.shapes.distance import Distance, revolved
-from epsmesh.shapes.indenter import BAND, Indenter
+from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.insertion import Needle
 from epsmesh.shapes.parabola import Parabola
 from epsmesh.shapes.probe import ON_EDGE, Probe
 from epsmesh.shapes.probes.disc import Disc
 from epsmesh.shapes.revolved import Revolved
-from epsmesh.shapes.section import Problems, in_mm
 from epsmesh.shapes.tip import STEEPEST, Tip
 from epsmesh.units import Length
 
@@ -84,16 +83,6 @@ class RoundIndenter(InRing, Needle):
             return None
         height = self.limit if self.height is None else self.height
         return Tip(self.section, self.limit, height, self.footprint.half_width)
-
-    def check_tip(self, problems: Problems) -> None:
-        """Report the keys of a tool that deforms, and a depth at which its side is steep where contact ends."""
-        super().check_tip(problems)
-        flat, (_, widest) = self.section.flat, self.contact_widths
-        if self.tip_shape and flat + BAND * (widest - flat) > self.footprint.half_width and self.force is None:
-            told = (
-                "is too large for a tool that deforms: its side is steep where contact ends. Omit `young`, or use less"
-            )
-            problems.error("probe.depth", in_mm(self.depths[1]), told)
 
     @property
     def kinks(self) -> tuple[float, ...]:

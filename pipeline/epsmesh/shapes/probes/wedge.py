@@ -1,6 +1,6 @@
 """A wedge, sharp or rounded."""
 
-from math import hypot, nan
+from math import hypot, inf, nan
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from epsmesh.shapes.probe import ON_EDGE, Probe
 from epsmesh.shapes.probes.blade import Blade
 from epsmesh.shapes.rounded import Rounded, rise
 from epsmesh.shapes.section import Problems, Words, in_mm
+from epsmesh.shapes.tip import STEEPEST, Tip
 from epsmesh.units import Angle, Length, Rounding
 
 
@@ -50,7 +51,22 @@ class Wedge(Indenter):
     @property
     def footprint(self) -> Probe:
         """The rectangle, as long as the edge, that contains all that it may touch."""
-        return self.touching(self.candidate_width)
+        return self.touching(self._widest)
+
+    @property
+    def _widest(self) -> float:
+        """Half the width (m) of what it may touch: of a tool that deforms, nothing where its side is nearly upright."""
+        steep = STEEPEST * self.tip
+        is_limited = self.elastic is not None and self.section.tangent > steep
+        return min(self.candidate_width, steep) if is_limited else self.candidate_width
+
+    @property
+    def tip_shape(self) -> Tip | None:
+        """The part that deforms, if its ends are flat."""
+        if self.elastic is None or self.edge:
+            return None
+        height = self.length / 2 if self.height is None else self.height
+        return Tip(self.section, inf, height, self._widest, self.length)
 
     @property
     def ends_sharply(self) -> bool:
@@ -75,9 +91,13 @@ class Wedge(Indenter):
     @property
     def edge_band(self) -> tuple[float, float]:
         """The smallest and the largest distance (m) from the edge at which contact is expected to end, off its ends."""
-        most = self.footprint.half_width
-        least, largest = (min(width, most) for width in self.contact_widths)
+        least, largest = (min(width, self._widest) for width in self.contact_widths)
         return least, min(1.3 * largest, self.section.reach(self.depths[1]))
+
+    @property
+    def rim_offset(self) -> float:
+        """Distance (m) from the strips in which contact is expected to end to the sides of the candidates."""
+        return self._widest - self.edge_band[1]
 
     @property
     def expected_radius(self) -> float:

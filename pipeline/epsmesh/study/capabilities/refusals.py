@@ -327,8 +327,8 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         "tool of a shape that does not deform",
         "tool that deforms",
-        'is rigid: tools that deform are a "sphere", a "cone", and a "disc" with a rounded `edge` in contact = '
-        '"unilateral". Omit `young`, `poisson` and `height`',
+        'is rigid: tools that deform are a "sphere", a "cone", a "wedge" with flat ends, and a "disc" with a rounded '
+        '`edge` in contact = "unilateral". Omit `young`, `poisson` and `height`',
     ),
     Refusal(
         "tool that deforms",
