@@ -6,6 +6,9 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 
+# Free residual at equilibrium, in units of the contact forces.
+LEFT = 1e-8
+
 
 @dataclass(frozen=True, eq=False)
 class Sliding:
@@ -30,8 +33,8 @@ class Constraint:
     the frames whose displacement is prescribed, to ``values`` (n, d), m. ``turning`` (n, d, d), N/m, is λ H, which is
     subtracted from the tangent. ``forces`` (n, d), N, act on the nodes besides the reactions; where they are friction,
     ``sliding`` is how they follow the reactions, for tissue that can solve for both. ``is_there``: held slots are next
-    to where they are held. ``resting`` (n) are the nodes above a bed: None if there is none. ``floats``: held slots
-    alone hold the body.
+    to where they are held. ``resting`` (n) are the nodes above a bed: None if there is none. ``is_tried``: the set of
+    held nodes still changes. A residual of the share ``left`` of the forces is enough in the end.
     """
 
     frames: FloatArray
@@ -42,7 +45,8 @@ class Constraint:
     sliding: Sliding | None = None
     is_there: bool = False
     resting: BoolArray | None = None
-    floats: bool = False
+    is_tried: bool = False
+    left: float = LEFT
 
     @property
     def is_turned(self) -> bool:

@@ -22,14 +22,14 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
-from epsmesh.solve.contact.constraint import Constraint
+from epsmesh.solve.contact.constraint import LEFT, Constraint
 from epsmesh.solve.contact.friction_step import FrictionIteration, FrictionStep, Placed
 from epsmesh.solve.contact.touching import SLACK, ContactSolution, NoTouchError, PlacedTool, Tissue
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.newton import HALVINGS, LargeError, Newton, advance, is_less
 
-# Free residual at the end, in units of the contact forces, and gap of active nodes, in units of the depth.
-LEFT, _CLOSED = 1e-8, 1e-8
+# Gap of active nodes at the end, in units of the depth.
+_CLOSED = 1e-8
 # A residual below this that no longer falls is the rounding error of a body that is large compared with the contact.
 _ROUNDING = 1e-6
 # With friction: the residual of nodes that slide, where their friction is that of the iteration before, and of others.
@@ -152,6 +152,7 @@ class _InContact(Newton[ContactSolution]):
         if self._floats:
             raise NoTouchError("a jaw, or a support, does not touch a single node: use smaller elements next to it")
         is_same, is_rough = np.array_equal(active, before), self._limit > 0
+        self._is_tried = iteration == 0 or not is_same
         # A rough solution has the next set: forces of nodes that leave it are residuals.
         pressing = before & active if is_rough else before
         self._pressed = np.where(pressing, along, 0.0)
@@ -181,8 +182,8 @@ class _InContact(Newton[ContactSolution]):
         constraint = _constraint(self._place, normal, np.where(active, self._pressed, 0.0), active)
         resting = self._tool.resting
         if resting is not None:
-            constraint = replace(constraint, resting=resting.nodes, floats=bool(resting.holds))
-        constraint = replace(constraint, is_there=self._is_closed)
+            constraint = replace(constraint, resting=resting.nodes)
+        constraint = replace(constraint, is_there=self._is_closed, is_tried=self._is_tried, left=max(LEFT, self._limit))
         if self._friction is not None:
             constraint = self._friction.constrain(constraint, self._there, active)
         elif resting is not None:
@@ -214,12 +215,13 @@ class _InContact(Newton[ContactSolution]):
     def _is_refuted(self, before: BoolArray, following: BoolArray, along: FloatArray) -> bool:
         """Return whether a step shows that its set ``before`` is not that of contact, with normal forces ``along`` (n).
 
-        A node certainly pulls or penetrates: by much more than what the step did not foresee. On linear tissue it
-        foresees all.
+        A node certainly pulls or penetrates: by much more than what the step did not foresee, or left unsolved. On
+        linear tissue it foresees all.
         """
         changed = (before != following) & ~self._tool.followers
         leaving, entering, gap = changed & before, changed & following, self._place.gap
-        pull, missed = -self._reactions[leaving], np.abs(along - self._reactions)[leaving]
+        missed = np.abs(along - self._reactions)[leaving] + self._tissue.unbalanced()
+        pull = -self._reactions[leaving]
         left_open = np.abs(gap[before]).max(initial=0.0)
         return bool((pull > _CERTAIN * missed).any() or (-gap[entering] > _CERTAIN * left_open).any())
 

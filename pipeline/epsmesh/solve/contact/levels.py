@@ -95,10 +95,10 @@ class Surface:
 
 
 class Hierarchy:
-    """Operators of degrees 1 … p, or of p alone for a direct solve. On lower levels the active set is a majority vote.
+    """Operators of degrees 1 … p, or of p alone for a direct solve.
 
-    For iterations only the smoothers change with the active set: above degree 1 the operators stay the same. ``masks``
-    says that the solver supports this.
+    On lower levels, nodes next to active ones are active. For iterations only the smoothers change with the active set:
+    above degree 1 the operators stay the same. ``masks`` says that the solver supports this.
     """
 
     def __init__(
@@ -131,12 +131,12 @@ class Hierarchy:
         """Positions of the candidates in the finest space."""
         return self._numberings[-1]
 
-    def hold(self, active: BoolArray, firm: BoolArray | None = None, *, floats: bool = False) -> list[Level]:
+    def hold(self, active: BoolArray, firm: BoolArray | None = None) -> list[Level]:
         """Return the levels with the ``active`` candidates (n) fixed, valid until the next call; collective.
 
-        Those that are ``firm`` (n), too, are fixed along all axes. ``floats``: nothing else holds the body.
+        Those that are ``firm`` (n), too, are fixed along all axes.
         """
-        sets = self._on_levels(active, floats=floats)
+        sets = self._on_levels(active)
         whole = [None] * len(sets) if firm is None else self._on_levels(firm)
         levels = zip(self._operators, self._numberings, self._pairs, sets, whole, strict=True)
         found = list[Level]()
@@ -147,10 +147,10 @@ class Hierarchy:
             found.append(operator.hold(dofs, None if pairs is None else pairs.holding(normal, every)))
         return found
 
-    def _on_levels(self, chosen: BoolArray, *, floats: bool = False) -> list[BoolArray]:
-        """Return which candidates of each level are ``chosen`` (n), by majority."""
+    def _on_levels(self, chosen: BoolArray) -> list[BoolArray]:
+        """Return which candidates of each level are next to those that are ``chosen`` (n)."""
         *coarser, finest = self._candidates
-        return [*(finest.lowered(chosen, lower, floats=floats) for lower in coarser), chosen]
+        return [*(finest.lowered(chosen, lower) for lower in coarser), chosen]
 
     def hold_facets(self, facets: Int32Array) -> list[Level]:
         """Return the levels with all of the local ``facets`` fixed, valid until the next call; collective."""

@@ -169,26 +169,13 @@ class Candidates:
         near[edge[area > self.weights[active].sum()]] = False
         return near
 
-    def lowered(self, active: BoolArray, lower: "Candidates", *, floats: bool = False) -> BoolArray:
-        """Return the nodes of a ``lower`` degree around which most nodes are active.
+    def lowered(self, active: BoolArray, lower: "Candidates") -> BoolArray:
+        """Return the nodes of a ``lower`` degree next to an active node.
 
-        Of a body that ``floats`` without contact, each contact with active nodes has one of that degree, too.
+        A coarse node that is free among active ones is too soft: its corrections are cut off at them.
         """
         near, this = lower._near(self).T
-        votes = np.bincount(near, np.where(active[this], 1.0, -1.0), len(lower))
-        found = np.asarray(votes > 0)
-        for nodes in lower.of_contacts if floats else ():
-            around = near[active[this] & np.isin(near, nodes)]
-            if len(around) and not found[nodes].any():
-                found[around[votes[around].argmax()]] = True
-        return found
-
-    @property
-    def of_contacts(self) -> list[IntArray]:
-        """The nodes that each of the contacts may touch."""
-        if self.contacts is None:
-            return [np.arange(len(self))]
-        return [np.unique(self.facets[self.contacts == number]) for number in range(int(self.contacts.max()) + 1)]
+        return lower._marked(near[active[this]])
 
     def at(self, place: tuple[float, float], values: FloatArray) -> float:
         """Return the value at a ``place`` (m), x and y, of nodal ``values`` (n), in the facet there or nearest."""

@@ -11,7 +11,6 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
-from epsmesh.solve.contact.deformed import LEFT
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.normals import deformed_normals
 from epsmesh.solve.contact.numbering import Numbering
@@ -136,7 +135,7 @@ class DeformedBody:
             self._numbering.add_vectors(right.array, constraint.forces / self._unit)
             if self._pairs is not None:
                 self._pairs.react(right.array, constraint.forces / self._unit)
-            target = LEFT * float(np.linalg.norm(self.forces())) / self._unit
+            target = constraint.left * float(np.linalg.norm(self.forces())) / self._unit
             self._tangent.solve(constraint, right, self._change, target)
             self.slope = None if self._body.is_mixed else -self._residual.dot(self._change)
             self._tangent.multiply(self._change, right)

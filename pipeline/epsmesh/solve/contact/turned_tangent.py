@@ -28,8 +28,9 @@ from epsmesh.solve.newton import FINE, forcing
 from epsmesh.solve.physics import MaterialLaw
 
 _MOST_ITERATIONS = 300
-# Tolerance of linear solves where nodes rest on a bed.
-_ON_BED = 1e-8
+# Tolerances of linear solves where nodes rest on a bed: the least, that with friction, and those while the set still
+# changes, without and with friction; and the share of the gain that is needed to the end.
+_ON_BED, _RUBBED, _TRIED, _TRIED_RUBBED, _SPARE = 1e-8, 1e-6, 1e-3, 1e-4, 0.1
 
 
 class TurnedTangent(ABC):
@@ -232,12 +233,15 @@ class IteratedTangent(TurnedTangent):
         is_mixed, norm = isinstance(self._elements, MixedElements), load.norm()
         gained, self._before = norm / self._before if self._before else 1.0, norm
         tolerance = forcing(gained, target / norm if norm else 1.0)
-        if constraint.sliding is not None:
+        rubs = constraint.sliding is not None
+        if rubs:
             # Friction is corrected once an iteration, and then gains little: its nodes would be judged by rough solves.
             tolerance = FINE
         if constraint.resting is not None:
-            # Far from the tool, nodes on a bed carry little, and rough solves would judge them.
-            tolerance = min(tolerance, _ON_BED)
+            # Far from the tool, nodes on a bed carry little, and rough solves would judge them in the end.
+            tried, least = (_TRIED_RUBBED, _RUBBED) if rubs else (_TRIED, _ON_BED)
+            needed = max(least, _SPARE * target / norm if norm else 1.0)
+            tolerance = max(tried, needed) if constraint.is_tried else needed
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
             how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
@@ -259,7 +263,7 @@ class IteratedTangent(TurnedTangent):
             held = self._numbering.normal_dofs(active, owned=True)
             if firm is not None:
                 held = np.union1d(held, self._numbering.all_dofs(firm, owned=True)).astype(np.int32)
-            levels = self._hierarchy.hold(active, firm, floats=constraint.floats)
+            levels = self._hierarchy.hold(active, firm)
             self._solver = self._elements.solver_on(levels, self._law, held, direct=False, earlier=self._solver)
             self._sets = sets
         if isinstance(self._solver, MixedSolver):
