@@ -197,11 +197,6 @@ def test_its_keys_are_dimensions_of_their_own():
         ({"probe": SOFT, "material": {"law": "neo-hookean"}}, "a law of large displacements"),
         ({"probe": SOFT | {"axis": [0.1, 0.0, -1.0]}}, "at right angles"),
         ({"probe": SOFT, "mesh": NO_SIZES | {"accuracy": "1 %"}}, "given sizes"),
-        ({"probe": SOFT | {"friction": 0.3}}, "on a tool that deforms"),
-        (
-            {"probe": SOFT, "body": {"layer": [SKIN | {"contact": "unilateral", "friction": "stick"}]}},
-            "above loose tissue",
-        ),
         ({"probe": SOFT | {"history": {"ramp": "1 s"}}}, "time steps"),
         ({"probe": SOFT, "solve": {"influence": True}}, "below a tool that deforms"),
     ],

@@ -3,6 +3,7 @@
 from math import inf, log, pi
 
 from epsmesh.shapes.closed import FarSizes
+from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.scanned import FINE, Scanned
 from epsmesh.study.case import Case
 from epsmesh.study.way import PLAIN, Way
@@ -60,16 +61,11 @@ _MEETING, _IN_FILM = 1.75, 3
 
 def cells(case: Case) -> float:
     """Return the estimated number of tetrahedra of a case, within about a factor of two."""
-    mesh, probe, body = case.mesh, case.expected, case.body
-    rim, growth, thickness = mesh.rim_size(probe.half_width), mesh.growth, body.thickness(case.frame)
-    length, area = probe.rim_size
-    # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
-    total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
-    # Below the area where contact may end: ∫ 1 / (rim + growth s)³ ds.
-    total += area / (2 * growth * rim**2)
-    if not probe.is_flat:  # small elements down to the depth of the tool, and beside it
-        _, depth = probe.depths
-        total += area * depth / rim**3 + length * depth / (growth * rim**2)
+    mesh, body, thickness = case.mesh, case.body, case.body.thickness(case.frame)
+    # A tool that deforms has above the contact the elements that tissue has below it.
+    growth, total = mesh.growth, _at_contact(case, case.expected) * (1 if case.probe.elastic is None else 2)
+    if case.expected_jaw is not None:
+        total += _at_contact(case, case.expected_jaw)
     total += _of_bend(case) + _MEETING * sum(_of_regions(case))
     epsilon = min(mesh.epsilon, (3 * body.volume / (2 * pi)) ** (1 / 3))
     if case.is_full or mesh.epsilon == inf:
@@ -88,6 +84,20 @@ def cells(case: Case) -> float:
     if not case.is_truncated:
         total += max(body.volume - inside, 0.0) / mesh.coarse**3
     return total / _TETRAHEDRON
+
+
+def _at_contact(case: Case, probe: Probe) -> float:
+    """Return the number of elements (as cubes of their size) where a ``probe`` touches tissue."""
+    mesh, growth, rim = case.mesh, case.mesh.growth, case.mesh.rim_size(probe.half_width)
+    length, area = probe.rim_size
+    # Half discs round the rim: ∫ π s / (rim + growth s)³ ds up to the distance where the size is fine.
+    total = length * pi * (1 / rim - 1 / mesh.fine) ** 2 * rim / (2 * growth**2) if rim < mesh.fine else 0.0
+    # Below the area where contact may end: ∫ 1 / (rim + growth s)³ ds.
+    total += area / (2 * growth * rim**2)
+    if not probe.is_flat:  # small elements down to the depth of the tool, and beside it
+        _, depth = probe.depths
+        total += area * depth / rim**3 + length * depth / (growth * rim**2)
+    return total
 
 
 def _of_bend(case: Case) -> float:

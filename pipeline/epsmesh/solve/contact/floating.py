@@ -22,9 +22,10 @@ def check_loose(surface: Surface, degree: int, bed: Bed) -> None:
     Raises:
         SolveError: if one is.
     """
-    pairs, space, tissue = surface.pairs(degree), surface.space(degree), bed.tissue
-    if pairs is None or tissue is None or bed.sticks:
+    space, tissue = surface.space(degree), bed.tissue
+    if tissue is None or bed.sticks:
         return
+    pairs = surface.loose(degree)
     tried = _motions(space, tissue)
     modes = tried[:6]
     is_held = np.zeros(space.owned)

@@ -10,7 +10,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.scene.model import BELOW, LOOSE, PROBE, TOOL
 from epsmesh.solve.conditions import WITHOUT_FOOTPRINT, Conditions
 from epsmesh.solve.contact.normals import means_of, nodal_normals
-from epsmesh.solve.contact.numbering import Numbering, Pairs, pairs_of
+from epsmesh.solve.contact.numbering import Numbering, Pairs, pairs_of, together
 from epsmesh.solve.contact.parts import part_of
 from epsmesh.solve.contact.surface import Candidates, find_candidates
 from epsmesh.solve.elements import elements_of
@@ -35,6 +35,7 @@ class Surface:
         self.spaces, self._conditions = spaces, conditions.without_footprint
         self._found: dict[int, Candidates] = {}
         self._pairs: dict[int, Pairs | None] = {}
+        self._loose: dict[int, Pairs] = {}
 
     def of(self, degree: int) -> Candidates:
         """Return the candidates of a ``degree``; collective."""
@@ -45,15 +46,20 @@ class Surface:
         return self._found[degree]
 
     def pairs(self, degree: int) -> Pairs | None:
-        """Return the pairs of nodes of loose tissue and the tissue below it; None without any; collective.
-
-        With a tool that deforms they are those of the tissue, which are called upper ones, and the tool's above them.
+        """Return the pairs of nodes of loose tissue and the tissue below it, and of the tissue and a tool that deforms:
+        those of the tissue are called upper ones, and the tool's above them lower. None without any; collective.
         """
         if degree not in self._pairs:
-            made = self._of_tool if self._conditions.deforms else self._of_loose
-            is_any = self._conditions.deforms or LOOSE in self._conditions.beds
-            self._pairs[degree] = made(degree) if is_any else None
+            found = [self._of_tool(degree)] if self._conditions.deforms else []
+            found += [self.loose(degree)] if LOOSE in self._conditions.beds else []
+            self._pairs[degree] = together(self.space(degree).space, found) if found else None
         return self._pairs[degree]
+
+    def loose(self, degree: int) -> Pairs:
+        """Return the pairs of loose tissue and the tissue below it alone; collective."""
+        if degree not in self._loose:
+            self._loose[degree] = self._of_loose(degree)
+        return self._loose[degree]
 
     def _of_tool(self, degree: int) -> Pairs:
         space, candidates = self.space(degree), self.of(degree)
@@ -73,9 +79,9 @@ class Surface:
         is_free = np.ones(space.owned)
         is_free[space.prescribed_owned] = 0.0
         means = np.zeros((len(loose.candidates.facets), 3))
-        if degree > 1 and (first := self.pairs(1)) is not None:
+        if degree > 1:
             lowest = part_of(self.of(1), 1 + self._conditions.beds.index(LOOSE)).candidates
-            means = means_of(lowest.facets, first.normal)
+            means = means_of(lowest.facets, self.loose(1).normal)
 
         def normal(upper: Numbering, free: FloatArray) -> FloatArray:
             pressed = upper.gather_vectors(pressed_by(self.spaces.body, space.space, LOOSE))

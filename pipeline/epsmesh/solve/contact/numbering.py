@@ -1,6 +1,6 @@
 """Candidates among the dofs of a space, and pairs of nodes where two surfaces of tissue touch."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -228,3 +228,13 @@ def pairs_of(
     normals = normal(of_upper, free)
     frames = turned_frames(normals, free.any(axis=1))
     return Pairs(of_upper, of_lower, free, upper, normals, frames, np.ones_like(free))
+
+
+def together(space: Any, found: Sequence[Pairs]) -> Pairs:
+    """Return the pairs of several contacts as one set; no node of one contact is in another."""
+    if len(found) == 1:
+        return found[0]
+    upper, lower = (np.concatenate([getattr(one, side).numbers for one in found]) for side in ("upper", "lower"))
+    arrays = ("free", "nodes", "normal", "frames", "tied")
+    joined = {name: np.concatenate([getattr(one, name) for one in found]) for name in arrays}
+    return Pairs(Numbering(space, upper), Numbering(space, lower), **joined)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from petsc4py import PETSc
 
-from epsmesh.arrays import FloatArray, Int32Array
+from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.levels import Hierarchy, Surface
 from epsmesh.solve.contact.numbering import Numbering, Pairs
@@ -77,7 +77,17 @@ class TurnedTangent(ABC):
 
     def _joined(self, constraint: Constraint) -> Pairs | None:
         """Return the pairs of loose tissue where a constraint holds."""
-        return None if self._pairs is None else self._pairs.holding(constraint.held[:, -1], constraint.firm)
+        return None if self._pairs is None else self._pairs.holding(constraint.held[:, -1], self._firm(constraint))
+
+    def _firm(self, constraint: Constraint) -> BoolArray | None:
+        """Return the nodes (n) whose tangents are held where the preconditioner has to know it: above a bed, and on a
+        tool that deforms, to which they are then tied."""
+        firm = constraint.firm
+        if self._pairs is None:
+            return firm
+        tied = np.zeros(len(constraint.held), dtype=bool)
+        tied[self._pairs.nodes] = constraint.held[self._pairs.nodes].all(axis=1)
+        return tied if firm is None else firm | tied
 
     def _slots(self, constraint: Constraint) -> Int32Array:
         """Return the owned dofs that are held in the turned frames: of the constraint, and prescribed ones."""
@@ -257,7 +267,7 @@ class IteratedTangent(TurnedTangent):
 
     def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
         """Return the preconditioner of linear elasticity with the same nodes held along z."""
-        active, firm = constraint.held[:, -1], constraint.firm
+        active, firm = constraint.held[:, -1], self._firm(constraint)
         sets = active if firm is None else np.append(active, firm)
         if self._solver is None or not np.array_equal(sets, self._sets):
             held = self._numbering.normal_dofs(active, owned=True)

@@ -42,10 +42,11 @@ class Located:
 class Locator:
     """Finds points in the cells that this rank owns of a dolfinx ``mesh`` of tetrahedra; nothing is collective.
 
-    Points are those of the mesh with its nodes as ``imaged`` (m), if these are given.
+    Points are those of the mesh with its nodes as ``imaged`` (m), if these are given. They are found in the ``chosen``
+    cells (n) alone.
     """
 
-    def __init__(self, mesh: Any, imaged: FloatArray | None = None):
+    def __init__(self, mesh: Any, imaged: FloatArray | None = None, chosen: BoolArray | None = None):
         owned = mesh.topology.index_map(mesh.topology.dim).size_local
         self._own = np.asarray(mesh.geometry.x)[compat.geometry_dofs(mesh)[:owned]]
         self._nodes = self._own if imaged is None else imaged[compat.geometry_dofs(mesh)[:owned]]
@@ -54,15 +55,16 @@ class Locator:
         margin = (_BULGE if self.order > 1 else INSIDE) * (high - low).max(axis=1, initial=0.0, keepdims=True)
         self._low, self._high = low - margin, high + margin
         self._sizes = np.linalg.norm(self._high - self._low, axis=1)
-        self._classes = list(self._by_size())
+        self._classes = list(self._by_size(np.arange(owned) if chosen is None else np.flatnonzero(chosen)))
 
-    def _by_size(self) -> Any:
-        """Yield, for each class of sizes, its cells, a tree of their centres and the radius that holds each."""
-        if not len(self._sizes):
+    def _by_size(self, chosen: IntArray) -> Any:
+        """Yield, by classes of size, ``chosen`` cells, a tree of their centres and the radius that holds each."""
+        if not len(chosen):
             return
-        number = np.floor(np.log(self._sizes / self._sizes.min()) / np.log(_CLASS)).astype(int)
+        sizes = self._sizes[chosen]
+        number = np.floor(np.log(sizes / sizes.min()) / np.log(_CLASS)).astype(int)
         for each in np.unique(number):
-            cells = np.flatnonzero(number == each)
+            cells = chosen[number == each]
             centres = (self._low[cells] + self._high[cells]) / 2
             yield cells, cKDTree(centres), self._sizes[cells].max() / 2
 

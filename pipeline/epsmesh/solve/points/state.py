@@ -85,8 +85,8 @@ class State:
 
     @cached_property
     def locator(self) -> Locator:
-        """The search for points in the cells of this rank."""
-        return Locator(self.body.mesh, self.body.imaged)
+        """The search for points in the cells of this rank, but for those of a tool that deforms."""
+        return Locator(self.body.mesh, self.body.imaged, self.body.is_tissue)
 
     def at(self, points: FloatArray, *, region: int | None = None) -> Values:
         """Return the values at ``points`` (n, 3), m, of the whole body, the same on every rank; collective.

@@ -342,8 +342,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "needs a plane face of a box or a cylinder, and a tool that presses at right angles to it, as the nodes of a "
         "tool that deforms are above those of the tissue: omit `young` for a rigid tool",
     ),
-    Refusal("tool that deforms", "loose layer", "is not computed above loose tissue: omit it, or the tissue's contact"),
-    Refusal("friction", "tool that deforms", "is not computed on a tool that deforms: omit it, or probe.young"),
     Refusal("tool that deforms", "grasp", "is not computed with two jaws: omit it, or `together`"),
     Refusal("tool that deforms", "accuracy", "is meshed with given sizes alone: give sizes, or omit it"),
     Refusal("tool that deforms", "region", "is meshed on boxes and cylinders alone: use an inclusion, or omit it"),
