@@ -164,6 +164,24 @@ def test_the_dataset_has_the_force_against_the_pull():
     assert found["slip_whole"].isnull().all()
 
 
+@pytest.mark.parametrize(
+    "material", [{}, pytest.param(LARGE, marks=pytest.mark.nightly)], ids=["linear", "large displacements"]
+)
+def test_a_longer_pull_goes_on_from_a_shorter_one(material):
+    pulls = {"pull": ["0.1 mm", "0.2 mm"]}
+    plan = make_plan(parse(grasp(SLIPS | pulls, body=SIDES, material=material, mesh=ROUGH)))
+    (step,) = plan.meshes
+    assert [len(operator.solves) for operator in step.operators] == [2]
+    both = compute(plan, MPI.COMM_SELF)
+    found, alone = both[plan.keys[1]], closed(SLIPS, body=SIDES, material=material, mesh=ROUGH)
+    assert found.force == pytest.approx(alone.force, rel=1e-3)
+    for name in ("pull_force", "jaw_pull_force", "friction_work", "pull_work", "slip_whole_force"):
+        assert found.largest[name] == pytest.approx(alone.largest[name], rel=2e-2), name
+    for name in ("pull_force", "slip_whole"):
+        assert abs(found.largest[name] - alone.largest[name]) <= found.largest[f"{name}_error"]
+    assert found.iterations < 0.9 * alone.iterations
+
+
 @pytest.mark.nightly
 def test_jaws_close_to_a_force_and_are_then_pulled(linear):
     force = linear["closed_force"]

@@ -11,6 +11,7 @@ from epsmesh.plan.refinement import refinements
 from epsmesh.plan.symmetry import mirror_planes, slides_across
 from epsmesh.shapes.body import PIECES, Body
 from epsmesh.shapes.capsule import Capsule
+from epsmesh.shapes.frame import unit
 from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.part import Around
 from epsmesh.shapes.probe import Probe
@@ -148,8 +149,8 @@ def _rim_text(case: Case) -> tuple[str, ...]:
 def operator_key(case: Case) -> str:
     """Return the key of a case's spaces and boundary conditions on its mesh: all further inputs but the moduli.
 
-    The depth is left out, too, if contact is found or displacements are large. Fields of moduli are conditions, too. A
-    shape without load is that of a law and its loads.
+    The depth is left out, too, if contact is found or displacements are large, and how far jaws are pulled. Fields of
+    moduli are conditions, too. A shape without load is that of a law and its loads.
     """
     probe = text_of(case.probe, (*_UNPHYSICAL, "depth") if case.way.is_followed else _UNPHYSICAL)
     fields = [tissue.varying.identity if tissue.varying else "" for tissue in case.tissues] if case.varies else []
@@ -157,7 +158,7 @@ def operator_key(case: Case) -> str:
     rests += [f"loose {loose.parts} {loose.friction}"] if (loose := case.body.loose) else []
     rests += [f"height {tip.height!r}"] if (tip := case.probe.tip_shape) else []
     rests += [f"jaw {text_of(jaw, _UNPHYSICAL)}"] if (jaw := case.jaw) else []
-    rests += [f"pull {_plain(case.probe.pulled)}"] if case.probe.pulled else []
+    rests += [f"pull {_plain(unit(case.probe.pull_direction))}"] if case.probe.pull else []
     shape = [] if case.imaged is None else [_load_text(case.imaged, case.densities), *map(_tissue_text, case.tissues)]
     return "\n".join([probe, str(case.mesh.degree), case.way.formulation, str(case.terms), *rests, *fields, *shape])
 

@@ -87,7 +87,7 @@ class Solve:
 class OperatorStep:
     """Solves that share spaces, boundary conditions and the assembly.
 
-    They differ only in the material, in the depth if contact is found, or in the place of a half ball.
+    They differ only in the material, in the depth and the pull if contact is found, or in the place of a half ball.
     """
 
     solves: tuple[Solve, ...]
@@ -99,19 +99,18 @@ class OperatorStep:
 
     @property
     def sweeps(self) -> tuple[tuple[Solve, ...], ...]:
-        """The solves by material, loads and place, each group in the order of the depths."""
-        return tuple(
-            tuple(sorted(group, key=lambda solve: solve.case.probe.depth)) for group in _grouped(self.solves, _scene_of)
-        )
+        """The solves by material, loads and place, each group in the order of the depths, and then of the pulls."""
+        return tuple(tuple(sorted(group, key=_way_of)) for group in _grouped(self.solves, _scene_of))
 
     @property
     def is_condensed(self) -> bool:
         """Whether unilateral contact has enough depths for each material to condense a small body.
 
         With an accuracy it does not apply: each depth then has its own error bar. Nor where the influence of each is
-        wanted, whose contact is that of the whole body.
+        wanted, whose contact is that of the whole body, nor to jaws that are pulled.
         """
-        is_plain = self.case.way.is_found and not (self.case.solve.timing or self.case.solve.influence)
+        case = self.case
+        is_plain = case.way.is_found and not (case.solve.timing or case.solve.influence or case.probe.pull)
         return is_plain and all(
             len(sweep) >= FEWEST_DEPTHS and all(solve.goal is None for solve in sweep) for sweep in self.sweeps
         )
@@ -174,7 +173,7 @@ def _mesh_of(solve: Solve) -> Hashable:
 
 
 def _scene_of(solve: Solve) -> Hashable:
-    """Return all that distinguishes solves of one operator, except the depth."""
+    """Return all that distinguishes solves of one operator, except the depth and the pull."""
     case = solve.case
     return (
         tuple((tissue.is_large and tissue.law, *tissue.lame, *tissue.further.values()) for tissue in case.tissues),
@@ -184,6 +183,12 @@ def _scene_of(solve: Solve) -> Hashable:
         case.densities,
         case.probe.at,
     )
+
+
+def _way_of(solve: Solve) -> tuple[float, float]:
+    """Return the depth (m) of a solve, and how far (m) the jaws are then pulled."""
+    probe = solve.case.probe
+    return probe.depth, probe.pull or 0.0
 
 
 def _grouped(solves: Collection[Solve], key: Callable[[Solve], Hashable]) -> list[tuple[Solve, ...]]:

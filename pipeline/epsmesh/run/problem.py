@@ -16,7 +16,7 @@ from epsmesh.run.far_field import far_field_of, far_field_seconds
 from epsmesh.run.fields import half_plane_fields, variation_of
 from epsmesh.run.loads import imaged_loads_of, loads_of, terms_of
 from epsmesh.run.room import MEMORY_SHARE
-from epsmesh.run.tools import beds_on, tool_of
+from epsmesh.run.tools import beds_on, pull_of, tool_of
 from epsmesh.shapes.distance import Distance
 from epsmesh.shapes.indenter import Indenter
 from epsmesh.shapes.tissue import FIBRE, Tissue
@@ -179,7 +179,7 @@ def movement_of(case: Case, meshed: Case | None = None) -> Movement:
 
     ``meshed`` is the case of the mesh, if it differs: a half ball at another place.
     """
-    return replace(_motions_of(case, meshed or case), loads=loads_of(case))
+    return replace(_motions_of(case, meshed or case), loads=loads_of(case), pull=pull_of(case))
 
 
 def _motions_of(case: Case, meshed: Case) -> Movement:

@@ -20,11 +20,11 @@ from epsmesh.study.case import Case
 def tool_of(case: Case) -> Tool:
     """Return the surface of the probe of ``case``, for the mesh turned so that the probe presses along -z."""
     *_, first = first_touch(case.body, case.probe, case.frame)
-    tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case), pull=_pull_of(case))
+    tool = replace(tool_at(case.probe, case.frame.upright, first), beds=beds_of(case))
     return replace(tool, normal=normal_of(case)) if case.way.is_inclined else tool
 
 
-def _pull_of(case: Case) -> Vector | None:
+def pull_of(case: Case) -> Vector | None:
     """Return how far (m) the jaws are pulled, for the same mesh."""
     pulled = case.probe.pulled
     return None if pulled is None else _turned_by(case.frame.turn, pulled)

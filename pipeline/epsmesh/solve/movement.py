@@ -97,13 +97,14 @@ class Movement:
     """Movement of the probe: ``motions`` times their amounts (m, or rad); translations have orthogonal directions.
 
     ``decoupled`` says that symmetry decouples the motions: none does work in another. ``loads`` are dead loads on the
-    tissue.
+    tissue. ``pull`` (m) is that of two jaws along the surface, after the motions.
     """
 
     motions: tuple[Motion, ...]
     amounts: tuple[float, ...]
     decoupled: bool = False
     loads: Loads | None = None
+    pull: Vector | None = None
 
     @property
     def far(self) -> FarField | None:

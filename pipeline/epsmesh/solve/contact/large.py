@@ -26,8 +26,7 @@ from epsmesh.solve.contact.floating import check_loose
 from epsmesh.solve.contact.large_solution import Beside, LargeContactSolution
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import placed_tool
-from epsmesh.solve.contact.pull import STEPS as PULL_STEPS
-from epsmesh.solve.contact.pull import Pull, pull_jaws
+from epsmesh.solve.contact.pull import Pull, Pulled, PullPaths
 from epsmesh.solve.contact.rest import Rest, height_beside, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.settle import without_friction
@@ -37,6 +36,7 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.elements.base import Elements, Equilibrium
 from epsmesh.solve.ended import ended
+from epsmesh.solve.movement import Vector
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.solution import Request
 
@@ -49,8 +49,8 @@ _BESIDE = 0.1
 class LargeContact:
     """Contact of a tool with a hyperelastic body of one law under loads; a load path continues to larger depths.
 
-    With friction each depth has a path of its own. ``STEPS`` is the number of its load steps: enough for a bar of some
-    tenths of a per cent where tissue sticks.
+    With friction each depth has a path of its own, which longer pulls at that depth continue. ``STEPS`` is the number
+    of its load steps: enough for a bar of some tenths of a per cent where tissue sticks.
     """
 
     STEPS: ClassVar[int] = 8
@@ -68,15 +68,18 @@ class LargeContact:
         self._sagged: Sagged | None = None
         self._settled = dict[int, Sagged]()  # with friction, by the number of load steps
         self._path: ContactPath | None = None
+        self._pulls = PullPaths(0.0)
         self._corrections = Corrections()
 
     def can_reach(self, asked: Request) -> bool:
         """Return whether the load path can be continued to a request; collective."""
-        loads, reached = asked.movement.loads, 0.0 if self._path is None else self._path.reached
+        loads, depth, pull = asked.movement.loads, asked.movement.amounts[0], asked.movement.pull
+        reached = 0.0 if self._path is None else self._path.reached
         is_same = loads is None
         if self._applied is not None:
             is_same = loads is not None and self._applied.is_same(self._elements.displacements.applied(loads))
-        return is_same and asked.law == self._law and reached <= asked.movement.amounts[0]
+        is_ahead = depth > self._pulls.depth or np.linalg.norm(pull or 0.0) >= self._pulls.reached
+        return is_same and asked.law == self._law and reached <= depth and bool(is_ahead)
 
     def solve(self, asked: Request, stack: ExitStack) -> Equilibrium:
         """Find equilibrium and contact at the depth of the movement; the ``stack`` frees what is made; collective.
@@ -87,7 +90,7 @@ class LargeContact:
         """
         found, iterations = self._without_friction(asked, stack)
         if self._tool.rubs:
-            found, more = self._with_friction(found)
+            found, more = self._with_friction(found, asked.movement.pull)
             iterations += more
         return found.equilibrium(asked.movement, iterations, stack)
 
@@ -111,34 +114,46 @@ class LargeContact:
             self._surface, body, self._smooth, touched, depth, self._sagged, self._corrections
         ), iterations
 
-    def _with_friction(self, smooth: LargeContactSolution) -> tuple[LargeContactSolution, int]:
-        """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`."""
+    def _with_friction(self, smooth: LargeContactSolution, way: Vector | None) -> tuple[LargeContactSolution, int]:
+        """Return contact with friction, beside that without, ``smooth``, and Newton's iterations; see :meth:`solve`.
+
+        Jaws that have closed are pulled by ``way`` (m).
+        """
         body, depth, state = smooth.body, smooth.depth, smooth.body.state
-        friction = Friction.on(body, self._tool, depth)
-        found, iterations = list[ContactSolution](), 0
-        pulls, rests = list[Pull](), list[tuple[Rest, ...]]()
-        for share in (2, 1):
-            sagged = self._settled_with_friction(smooth, friction, self.STEPS // share)
-            tool = sagged.placed(self._tool, body)
-            path = ContactPath(ContactPathPoint(0.0, sagged.state, sagged.touched))
+        friction, iterations = Friction.on(body, self._tool, depth), 0
+        if depth != self._pulls.depth:
+            self._pulls = PullPaths(depth)
+
+        def close(sagged: Sagged, steps: int) -> ContactSolution:
+            nonlocal iterations
+            tool, path = (
+                sagged.placed(self._tool, body),
+                ContactPath(ContactPathPoint(0.0, sagged.state, sagged.touched)),
+            )
             try:
-                above, steps = partial(placed_tool, body, tool), self.STEPS // share
+                above = partial(placed_tool, body, tool)
                 iterations += reach_contact_with_friction(body, above, path, depth, friction, steps)
             except LargeError as error:
                 raise stopped(body, path, depth, error, self._tool, self._tool.friction) from error
-            touched = path.last.touched
-            assert touched is not None
+            assert path.last.touched is not None
             body.state = path.last.state
-            if tool.pull is not None:
-                pulls.append(pull_jaws(body, tool, depth, touched, friction, PULL_STEPS // share))
-                touched = pulls[-1].end.touched
-                iterations += sum(step.touched.iterations for step in pulls[-1].steps[1:])
-            found.append(touched)
-            rests.append(rests_of(body, self._tool.beds, touched))
+            return path.last.touched
+
+        found, pulls, rests = list[ContactSolution](), list[Pull](), list[tuple[Rest, ...]]()
+        for name, steps in (("coarse", self.STEPS // 2), ("fine", self.STEPS)):
+            sagged = self._settled_with_friction(smooth, friction, steps)
+            if way is None:
+                found.append(close(sagged, steps))
+            else:
+                tool, before = sagged.placed(self._tool, body), self._pulls.steps(name)
+                pulls.append(self._pulls.pull(name, body, tool, way, friction, partial(close, sagged, steps)))
+                found.append(pulls[-1].end.touched)
+                iterations += sum(step.touched.iterations for step in pulls[-1].steps[before:])
+            rests.append(rests_of(body, self._tool.beds, found[-1]))
         coarse, fine = found
-        beside = Beside(smooth, state, coarse, self.STEPS // 2, rests[0], tuple(pulls))
-        is_moved = tool.pull is not None and not self._law.is_linear
-        there = self._tool.moved(np.array(tool.pull)) if is_moved else self._tool
+        pulled = None if way is None else Pulled(way, pulls[0], pulls[1], self._pulls)
+        beside = Beside(smooth, state, coarse, self.STEPS // 2, rests[0], pulled)
+        there = self._tool if way is None or self._law.is_linear else self._tool.moved(np.array(way))
         return replace(smooth, tool=there, touched=fine, sagged=sagged, beside=beside), iterations
 
     def _settled_with_friction(self, smooth: LargeContactSolution, friction: Friction, steps: int) -> Sagged:

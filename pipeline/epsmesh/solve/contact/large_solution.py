@@ -31,7 +31,7 @@ from epsmesh.solve.contact.deformed import first_set, solve_contact
 from epsmesh.solve.contact.estimators import estimate_of, half_the_steps
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.placed import check_edges, placed_tool
-from epsmesh.solve.contact.pull import Pull, with_bars
+from epsmesh.solve.contact.pull import Pulled
 from epsmesh.solve.contact.rest import Rest, force_left, overlap, rests_of
 from epsmesh.solve.contact.sagged import Sagged, sagged_body
 from epsmesh.solve.contact.surface_contact import SurfaceContact, on_surface
@@ -61,8 +61,7 @@ _NEARBY = 1e-3
 class Beside:
     """Beside contact with friction: that without, ``smooth``, with its ``state``; and the one from half the steps.
 
-    ``closing`` is the number of these steps, and ``rests`` what beds do there. ``pulls`` are those in half the steps,
-    and in all, of jaws that are pulled.
+    ``closing`` is the number of these steps, and ``rests`` what beds do there. ``pulled`` are jaws that are.
     """
 
     smooth: "LargeContactSolution"
@@ -70,7 +69,7 @@ class Beside:
     coarse: ContactSolution
     closing: int
     rests: tuple[Rest, ...] = ()
-    pulls: tuple[Pull, ...] = ()
+    pulled: Pulled | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,9 +134,9 @@ class LargeContactSolution:
         found = self.surface_contact.result(self.sagged.sag, stored)
         rests = tuple(rest.result() for rest in self.rests) or found.rests  # or the image of the tool
         found = replace(found, rests=rests, shortening=self.shortening)
-        if self.beside is None or not self.beside.pulls:
+        if self.beside is None or self.beside.pulled is None:
             return found
-        return replace(found, pull=self.beside.pulls[-1].result(self.body.elements.body))
+        return replace(found, pull=self.beside.pulled.fine.result(self.body.elements.body))
 
     def check(self) -> None:
         """Check the work, and that contact ends within the candidates.
@@ -184,14 +183,14 @@ class LargeContactSolution:
             both = zip(self.rests, found.rests, self.beside.rests, smooth.rests, strict=True)
             rests = tuple(rest.half_the_steps(bars, coarse, of_smooth) for rest, bars, coarse, of_smooth in both)
             found = replace(found, rests=rests, shortening_bar=found.shortening_bar + more)
-            if not self.beside.pulls:
+            if (pulled := self.beside.pulled) is None:
                 return found
-            above = (self.body, self.surface, self.beside.smooth.tool, self.depth, self.beside.closing)
             assert found.relative is not None
             at_edge = max([self.surface_contact.area.bar, *(rest.area.bar for rest in self.rests)])
             of_jaws = [float(found.relative[0]), *(rest.force for rest in found.rests)]
             bars = of_jaws, at_edge
-            return replace(found, pull=with_bars(self.beside.pulls, *above, bars, stack))
+            above = (self.body, self.surface, smooth.tool, self.beside.closing)
+            return replace(found, pull=pulled.with_bars(*above, bars, stack))
         finer, here = self._found_again(movement.loads, stack), self.surface_contact
         # The edge at which the body lifts off a bed is found, too.
         share, at_edge = 1 - finer.force / self.force, max([here.area.bar, *(rest.area.bar for rest in self.rests)])

@@ -1,12 +1,14 @@
 """Jaws that have closed, and are then pulled along the surface together: force, slip, and work.
 
-The pull is a load path of its own, from the equilibrium of the closed jaws on. Nodes that stick move with the tool.
-With a linear law the gaps stay those above the undeformed places: the pull is small beside the contact.
+The pull is a load path of its own, from the equilibrium of the closed jaws on; a longer pull continues it. Nodes that
+stick move with the tool. With a linear law the gaps stay those above the undeformed places: the pull is small beside
+the contact.
 """
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import ceil
 
 import numpy as np
 
@@ -30,10 +32,13 @@ from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 from epsmesh.solve.contact_result import PullResult, Slip
 from epsmesh.solve.estimate import found_again_bar
+from epsmesh.solve.movement import Vector
 from epsmesh.solve.newton import LargeError
 
-# Steps of a pull, of equal lengths.
+# Steps of a pull, of equal lengths. One that continues a shorter pull follows the rest in steps of this length or less.
 STEPS = 16
+# Rounding of the number of steps.
+_SLIVER = 1e-6
 # Largest share of the work of a pull that is neither heat nor stored. Steps of a sixteenth leave below a thousandth.
 _LOST = 0.02
 
@@ -65,14 +70,22 @@ class Pull:
     """The ``steps`` of a pull, the first of which is its beginning, where the force on the first jaw is ``closed`` (N).
 
     Energies (J) are the ``work`` of the jaws, the ``heat`` of friction, and what the tissue has ``stored``, all of the
-    modelled part.
+    modelled part. ``state`` and ``energy`` (J) are those of the tissue at the end.
     """
 
     steps: tuple[PullStep, ...]
-    work: float
-    heat: float
-    stored: float
     closed: float
+    state: FloatArray
+    energy: float
+    work: float = 0.0
+    heat: float = 0.0
+    stored: float = 0.0
+
+    @classmethod
+    def begin(cls, body: DeformedBody, tool: Tool, touched: ContactSolution, way: Vector) -> "Pull":
+        """Return the beginning, along a ``way``, of jaws that have ``touched`` a ``body`` in its state; collective."""
+        step = _step(body, 1 + len(tool.beds), 0.0, touched, _direction(way))
+        return cls((step,), force_of(body.part().solution(touched)), body.state, body.energy)
 
     @property
     def end(self) -> PullStep:
@@ -101,18 +114,59 @@ class Pull:
         return None
 
 
-def pull_jaws(
-    body: DeformedBody, tool: Tool, depth: float, touched: ContactSolution, friction: Friction, steps: int
+@dataclass(eq=False)
+class PullPaths:
+    """The longest pulls so far of jaws that have closed to a ``depth`` (m), which longer ones continue.
+
+    They are the ``coarse`` one, in half the steps, the ``fine`` one, in all, and the one ``above``, in half the steps
+    and elements of one degree more.
+    """
+
+    depth: float
+    longest: dict[str, Pull] = field(default_factory=dict)
+
+    @property
+    def reached(self) -> float:
+        """How far (m) the jaws have been pulled."""
+        return max((pull.end.moved for pull in self.longest.values()), default=0.0)
+
+    def steps(self, name: str) -> int:
+        """Return the number of steps of a pull so far."""
+        return len(self.longest[name].steps) if name in self.longest else 1
+
+    def pull(
+        self,
+        name: str,
+        body: DeformedBody,
+        tool: Tool,
+        way: Vector,
+        friction: Friction,
+        close: Callable[[], ContactSolution],
+    ) -> Pull:
+        """Pull a ``tool`` and its second jaws by ``way`` (m), after ``close`` has closed them; collective.
+
+        The ``body`` is in the state at the end.
+
+        Raises:
+            LargeError: if a step becomes too small.
+        """
+        if name not in self.longest:
+            self.longest[name] = Pull.begin(body, tool, close(), way)
+        steps = STEPS if name == "fine" else STEPS // 2
+        self.longest[name] = found = _continued(self.longest[name], body, tool, self.depth, way, friction, steps)
+        return found
+
+
+def _continued(
+    pull: Pull, body: DeformedBody, tool: Tool, depth: float, way: Vector, friction: Friction, steps: int
 ) -> Pull:
-    """Pull a ``tool`` and its second jaws, which have ``touched`` the body at a ``depth`` (m); collective.
+    """Return a ``pull`` that has gone on to ``way`` (m), in the ``steps`` that the rest has of its whole length.
 
     Raises:
         LargeError: if a step becomes too small.
     """
-    assert tool.pull is not None
-    way = np.array(tool.pull)
-    length, count = float(np.linalg.norm(way)), 1 + len(tool.beds)
-    along = way / length
+    along, length, start = _direction(way), float(np.linalg.norm(way)), pull.end.moved
+    count = ceil(steps * (1 - start / length) - _SLIVER)
 
     def moved_tool(moved: float) -> Tool:
         return tool if body.law.is_linear else tool.moved(moved * along)
@@ -121,16 +175,17 @@ def pull_jaws(
         return placed_tool(body, moved_tool(moved), depth)
 
     rubs = replace(friction, advance=np.tile(along, (len(body.fixed), 1)), is_at_depth=True)
-    path, energy, work, heat = ContactPath(ContactPathPoint(0.0, body.state, touched)), body.energy, 0.0, 0.0
-    found, places = [_step(body, count, 0.0, touched, along)], body.positions()
-    for number in range(1, steps + 1):
-        path.step, moved = np.inf, length * number / steps
+    path, work, heat = ContactPath(ContactPathPoint(start, pull.state, pull.end.touched)), pull.work, pull.heat
+    body.state = pull.state
+    found, places = [*pull.steps], body.positions()
+    for number in range(1, count + 1):
+        path.step, moved = np.inf, start + (length - start) * number / count
         try:
             reach_contact(body, tool_at, path, moved, rubs)
             now = path.last.touched
             assert now is not None
             check_edges(body, moved_tool(moved), now)
-            after = _step(body, count, moved, now, along)
+            after = _step(body, 1 + len(tool.beds), moved, now, along)
         except SolveError as error:
             raise _ended(error, found, body, depth, length) from error
         before, here = found[-1], body.positions()
@@ -142,67 +197,78 @@ def pull_jaws(
         heat -= float(((before.touched.forces + now.forces) * slips).sum()) / 2
         places = here
         found.append(after)
-    result = Pull(tuple(found), work, heat, body.energy - energy, force_of(body.part().solution(touched)))
-    if not abs(result.work - result.heat - result.stored) <= _LOST * (abs(result.heat) + abs(result.stored)):
+    stored = pull.stored + body.energy - pull.energy
+    if not abs(work - heat - stored) <= _LOST * (abs(heat) + abs(stored)):
         raise LargeError(
-            f"the work of the pull, {result.work:.3g} J, is not what friction turns into heat, {result.heat:.3g} J, "
-            f"and what the tissue stores, {result.stored:.3g} J"
+            f"the work of the pull, {work:.3g} J, is not what friction turns into heat, {heat:.3g} J, and what the "
+            f"tissue stores, {stored:.3g} J"
         )
-    return result
+    return Pull(tuple(found), pull.closed, body.state, body.energy, work, heat, stored)
 
 
-def close_and_pull(body: DeformedBody, tool: Tool, depth: float, closing: int, pulling: int) -> Pull:
-    """Close a ``tool`` and its second jaws up to a ``depth`` (m) on a ``body`` in its state, then pull; collective.
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """Jaws that have been pulled by ``way`` (m): in half the steps, ``coarse``, and in all of them, ``fine``.
 
-    Steps of ``closing`` and of ``pulling`` are so many at least.
-
-    Raises:
-        LargeError: if a step becomes too small.
+    ``paths`` are those that both are on.
     """
-    path, friction = ContactPath(ContactPathPoint(0.0, body.state)), Friction.on(body, tool, depth)
-    reach_contact_with_friction(body, lambda amount: placed_tool(body, tool, amount), path, depth, friction, closing)
-    assert path.last.touched is not None
-    body.state = path.last.state
-    return pull_jaws(body, tool, depth, path.last.touched, friction, pulling)
+
+    way: Vector
+    coarse: Pull
+    fine: Pull
+    paths: PullPaths
+
+    def with_bars(
+        self,
+        body: DeformedBody,
+        surface: Surface,
+        tool: Tool,
+        closing: int,
+        bars: tuple[Sequence[float], float],
+        stack: ExitStack,
+    ) -> PullResult:
+        """Return the pull in all steps with its 95 % bars; collective.
+
+        They are from the change by half the steps, and the change of these in elements of one degree more, in which
+        the jaws of a ``tool`` close in so many steps, ``closing``. Of the relative ``bars`` the first are those on the
+        normal forces: after whole slip, forces along the pull are in proportion to them. The last is that on the areas
+        by the size of elements. The ``stack`` frees what is made.
+
+        Raises:
+            LargeError: if the next degree fails.
+        """
+        elements, depth = body.elements, self.paths.depth
+        try:
+            above = surface.elements(elements.degree + 1, elements.element, stack)
+            finer = DeformedBody(above, surface, body.law, body.method, stack)
+            placed = sagged_body(finer, tool, None).placed(tool, finer)
+            friction = Friction.on(finer, placed, depth)
+
+            def close() -> ContactSolution:
+                path = ContactPath(ContactPathPoint(0.0, finer.state))
+                reach_contact_with_friction(
+                    finer, lambda amount: placed_tool(finer, placed, amount), path, depth, friction, closing
+                )
+                assert path.last.touched is not None
+                finer.state = path.last.state
+                return path.last.touched
+
+            again = self.paths.pull("above", finer, placed, self.way, friction, close)
+        except SolveError as error:
+            raise LargeError(f"no error bar: elements of degree {elements.degree + 1} fail ({error})") from error
+        (pressed, at_edge), least = bars, fitted.AT_EDGE_LARGE[elements.degree]
+        of_degree = [found_again_bar(share, at_edge, least)[1] for share in self.coarse.changes(again)]
+        of_steps = map(abs, self.fine.changes(self.coarse))
+        bar = float(np.max([*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True))]))
+        half, whole, finest = (pull.result(elements.body) for pull in (self.coarse, self.fine, again))
+        found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
+        # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
+        return replace(found, begins=found.begins and found.begins.from_zero())
 
 
-def with_bars(
-    pulls: tuple[Pull, ...],
-    body: DeformedBody,
-    surface: Surface,
-    tool: Tool,
-    depth: float,
-    closing: int,
-    bars: tuple[Sequence[float], float],
-    stack: ExitStack,
-) -> PullResult:
-    """Return the last of the ``pulls`` in half the steps, and in all of them, with its 95 % bars; collective.
-
-    They are from the change by half the steps, and the change of these in elements of one degree more, in which jaws
-    close in so many steps, ``closing``. Of the relative ``bars`` the first are those on the normal forces: after whole
-    slip, forces along the pull are in proportion to them. The last is that on the areas by the size of elements. The
-    ``stack`` frees what is made.
-
-    Raises:
-        LargeError: if the next degree fails.
-    """
-    coarse, fine = pulls
-    elements = body.elements
-    try:
-        above = surface.elements(elements.degree + 1, elements.element, stack)
-        finer = DeformedBody(above, surface, body.law, body.method, stack)
-        placed = sagged_body(finer, tool, None).placed(tool, finer)
-        again = close_and_pull(finer, placed, depth, closing, len(coarse.steps) - 1)
-    except SolveError as error:
-        raise LargeError(f"no error bar: elements of degree {elements.degree + 1} fail ({error})") from error
-    (pressed, at_edge), least = bars, fitted.AT_EDGE_LARGE[elements.degree]
-    of_degree = [found_again_bar(share, at_edge, least)[1] for share in coarse.changes(again)]
-    of_steps = map(abs, fine.changes(coarse))
-    bar = float(np.max([*pressed, *(sum(both) for both in zip(of_degree, of_steps, strict=True))]))
-    half, whole, finest = (pull.result(elements.body) for pull in (coarse, fine, again))
-    found = whole.with_bar(bar).with_change(whole, half).with_change(half, finest)
-    # Slip begins at one node, at the edge of contact: where the pressure falls to zero there, with the pull.
-    return replace(found, begins=found.begins and found.begins.from_zero())
+def _direction(way: Vector) -> FloatArray:
+    """Return the unit vector of a ``way``."""
+    return np.array(way) / float(np.linalg.norm(way))
 
 
 def _step(body: DeformedBody, contacts: int, moved: float, touched: ContactSolution, along: FloatArray) -> PullStep:

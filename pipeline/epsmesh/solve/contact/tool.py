@@ -28,7 +28,7 @@ class Tool:
     ``foot`` (m) are x and y of its axis. ``is_sharp`` says that it ends at a sharp edge, off which tissue slides.
     ``normal`` is the surface's outward unit normal at the first touch, if that is inclined to the axis. ``beds`` are
     the surfaces that touch the body besides, ``begins`` (n) the nodes of all that touch before the tool does; None for
-    all above supports. Once at its depth, it moves by ``pull`` (m), with the second jaws among the beds.
+    all above supports.
     """
 
     height: Callable[[FloatArray], FloatArray]
@@ -41,7 +41,6 @@ class Tool:
     normal: Vector | None = None
     beds: tuple[Bed, ...] = ()
     begins: BoolArray | None = None
-    pull: Vector | None = None
 
     @property
     def rubs(self) -> bool:
