@@ -222,10 +222,10 @@ def more_steps(study: Study) -> Iterator[None]:
     if not has_two_contacts(study):
         yield
         return
-    from epsmesh.solve.contact import large
+    from epsmesh.solve.contact import large, pull
 
     with (
         patch.object(large.LargeContact, "STEPS", 2 * large.LargeContact.STEPS),
-        patch.object(large, "PULL_STEPS", 2 * large.PULL_STEPS),
+        patch.object(pull.PullPaths, "STEPS", 2 * pull.PullPaths.STEPS),
     ):
         yield

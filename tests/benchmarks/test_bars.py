@@ -10,7 +10,7 @@ import pytest
 from benchmarks import bars
 from benchmarks.bars import HELD, Row, compared, interval, report, table
 from benchmarks.drawn import has_two_contacts, more_steps, scene, truths
-from epsmesh.solve.contact import large
+from epsmesh.solve.contact import large, pull
 from tests.pairs import BASE
 from tests.physics import hashes
 from tests.same.outcome import Outcome, Value
@@ -54,7 +54,7 @@ def test_scenes_of_some_features_have_one_of_them_and_differ_in_more_than_that(f
 
 def test_the_truth_of_two_contacts_is_followed_in_more_steps():
     def steps():
-        return large.LargeContact.STEPS, large.PULL_STEPS
+        return large.LargeContact.STEPS, pull.PullPaths.STEPS
 
     usual = steps()
     with more_steps(BASE):

@@ -13,7 +13,7 @@ from epsmesh.run.execute import compute
 from epsmesh.run.solved import solve_alone
 from epsmesh.scene.model import JAW, PROBE
 from epsmesh.shapes.grasp import MIDDLE
-from epsmesh.solve.contact import large
+from epsmesh.solve.contact import large, pull
 from epsmesh.study.read import parse
 from tests.cases import ROUGH
 from tests.solve.test_grasp import BALL, BLADE, DISC, LARGE, closed, grasp
@@ -97,7 +97,7 @@ def test_halves_are_the_whole(jaw, changes, reached):
 @pytest.mark.parametrize("material", [{}, pytest.param(LARGE, marks=pytest.mark.nightly)], ids=["linear", "large"])
 def test_halves_are_pulled_as_the_whole(material, monkeypatch):
     monkeypatch.setattr(large.LargeContact, "STEPS", 4)
-    monkeypatch.setattr(large, "PULL_STEPS", 8)
+    monkeypatch.setattr(pull.PullPaths, "STEPS", 8)
     changes = {"body": SIDES, "material": material, "mesh": ROUGH | {"rim": "1.6 mm"}}
     half, whole = (found(SLIPS, **changes) for found in (closed, with_both))
     assert half.status == whole.status == "ok", (half.message, whole.message)

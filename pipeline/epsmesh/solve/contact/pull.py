@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,8 +36,6 @@ from epsmesh.solve.estimate import found_again_bar
 from epsmesh.solve.movement import Vector
 from epsmesh.solve.newton import LargeError
 
-# Steps of a pull, of equal lengths. One that continues a shorter pull follows the rest in steps of this length or less.
-STEPS = 16
 # Rounding of the number of steps.
 _SLIVER = 1e-6
 # Largest share of the work of a pull that is neither heat nor stored. Steps of a sixteenth leave below a thousandth.
@@ -119,8 +118,11 @@ class PullPaths:
     """The longest pulls so far of jaws that have closed to a ``depth`` (m), which longer ones continue.
 
     They are the ``coarse`` one, in half the steps, the ``fine`` one, in all, and the one ``above``, in half the steps
-    and elements of one degree more.
+    and elements of one degree more. ``STEPS`` is the number of steps of a pull, of equal lengths. One that continues
+    a shorter pull follows the rest in steps of this length or less.
     """
+
+    STEPS: ClassVar[int] = 16
 
     depth: float
     longest: dict[str, Pull] = field(default_factory=dict)
@@ -152,7 +154,7 @@ class PullPaths:
         """
         if name not in self.longest:
             self.longest[name] = Pull.begin(body, tool, close(), way)
-        steps = STEPS if name == "fine" else STEPS // 2
+        steps = self.STEPS if name == "fine" else self.STEPS // 2
         self.longest[name] = found = _continued(self.longest[name], body, tool, self.depth, way, friction, steps)
         return found
 
