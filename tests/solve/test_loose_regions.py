@@ -122,8 +122,9 @@ def test_a_ball_that_slides_is_softer_and_its_pressure_has_no_resultant():
 @pytest.mark.nightly
 def test_a_factorisation_finds_what_iterations_find():
     iterated, factorised = (one(body=ball(0.2), solve={"method": method}) for method in ("iterative", "direct"))
-    assert factorised.force == pytest.approx(iterated.force, rel=1e-6)
-    assert factorised.largest["lift_off_area"] == pytest.approx(iterated.largest["lift_off_area"], rel=1e-5)
+    # The friction of nodes that slide is settled to a residual of 1e-4 of the contact forces.
+    assert factorised.force == pytest.approx(iterated.force, rel=2e-5)
+    assert factorised.largest["lift_off_area"] == pytest.approx(iterated.largest["lift_off_area"], rel=5e-5)
 
 
 @pytest.mark.nightly
