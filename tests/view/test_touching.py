@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from epsmesh.run.solved import solve_alone
-from epsmesh.scene.model import BELOW, FIXED, JAW, LOOSE, PROBE
+from epsmesh.scene.model import BELOW, FIXED, JAW, LOOSE, PROBE, TOOL
 from epsmesh.study.read import parse
 from epsmesh.view.compute import compute_fields
 from epsmesh.view.numbers import FACES, mesh_arrays
@@ -16,6 +16,7 @@ from epsmesh.view.page import render
 from epsmesh.view.tool import tool_of
 from tests.cases import raw
 from tests.solve.test_curved_support import SHAPES, on_a
+from tests.solve.test_elastic_tool import SOFT
 from tests.solve.test_grasp import BALL, grasp
 from tests.solve.test_loose import WEIGHT, flap
 from tests.solve.test_support import HEAVY, on
@@ -121,6 +122,17 @@ def test_the_plane_of_a_support_reaches_beyond_the_body_and_does_not_move(rests)
     assert (plane[:, :2].max(axis=0) > 22e-3).all()
     inputs = told(rests)[1]
     assert (inputs["touching"], inputs["held"]) == ("tool and support", "on the support")
+
+
+def test_tissue_and_a_tool_that_deforms_have_the_same_pressure_and_no_rigid_tool_is_drawn():
+    found = fields(raw(probe=SOFT, mesh={"fine": "4 mm", "coarse": "12 mm", "rim": "0.3 mm"}))
+    for group in (PROBE, TOOL):
+        assert resultant(found, group) == pytest.approx(found.force, rel=0.1)
+    assert found.pressure[TOOL].max() == pytest.approx(found.pressure[PROBE].max(), rel=0.1)
+    assert not len(tool_of(found).points)
+    inputs = told(found)[1]
+    assert (inputs["touching"], inputs["held"]) == ("", "fixed")
+    assert inputs["high"][2] > 1  # the tool is seen
 
 
 @pytest.mark.parametrize(("shape", "hollow"), SHAPES)

@@ -19,7 +19,7 @@ from epsmesh.run.map_resolution import change_with_wider_voxels
 from epsmesh.run.mesh_cache import MeshCache
 from epsmesh.run.solved import Solved, modelled_arrays, solve_fields
 from epsmesh.run.tools import beds_on
-from epsmesh.scene.model import BELOW, PROBE
+from epsmesh.scene.model import BELOW, PROBE, TOOL
 from epsmesh.shapes.grasp import MIDDLE
 from epsmesh.shapes.section import in_mm
 from epsmesh.solve.cell_values import CellValues
@@ -76,8 +76,8 @@ def fields_of(solved: Solved, *, stress: bool = False) -> Fields | None:
     stresses = stresses_of(solved.state, mirrors) if stress else None
     case, pressure = solved.solve.case, dict[str, FloatArray]()
     if case.way.is_found:
-        other_side = (BELOW,) if case.body.loose else ()
-        pressure = pressures_of(solved.state, arrays, (PROBE, *beds_on(case), *other_side), mirrors)
+        others = [name for name, found in ((BELOW, case.body.loose), (TOOL, case.probe.elastic)) if found]
+        pressure = pressures_of(solved.state, arrays, (PROBE, *beds_on(case), *others), mirrors)
     if arrays is None:
         return None
     fields = _whole(solved.solve, arrays, displacement, strain)

@@ -112,9 +112,17 @@ def _inputs(fields: Fields) -> dict[str, Any]:
         "start": fields.drawn_factor if is_solved else 0,
         "keeps_depth": not fields.case.probe.is_flat,
         "outline": [(_MM * (line - fields.contact)).round(4).tolist() for line in fields.outline],
-        "touching": "jaws" if case.jaw is not None else "tool and support" if case.body.resting is not None else "tool",
+        "touching": _touching(case),
         "held": _held(case),
     }
+
+
+def _touching(case: Case) -> str:
+    """Return what is said of rigid bodies that touch the tissue, "" if there is none."""
+    if case.jaw is not None:
+        return "jaws"
+    found = {"tool": case.probe.elastic is None, "support": case.body.resting is not None}
+    return " and ".join(name for name, is_there in found.items() if is_there)
 
 
 def _held(case: Case) -> str:

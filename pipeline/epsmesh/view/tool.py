@@ -35,9 +35,14 @@ class Tool:
 
 
 def tool_of(fields: Fields) -> Tool:
-    """Return the tool of a case, the second jaw of a grasp, and a support that lets go."""
+    """Return the tool of a case, the second jaw of a grasp, and a support that lets go.
+
+    A tool that deforms is part of the mesh: without a support nothing is left.
+    """
     case = fields.case
-    parts = [_tool(fields, case.probe, PROBE)]
+    parts = [Tool(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3)))]
+    if case.probe.elastic is None:
+        parts.append(_tool(fields, case.probe, PROBE))
     if case.jaw is not None:
         parts.append(_tool(fields, case.jaw, JAW))
     if case.body.resting is not None and (ground := case.body.ground) is not None:

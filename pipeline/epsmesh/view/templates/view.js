@@ -36,6 +36,7 @@ class Page {
     words.footprint = inputs.touching === "jaws" ? "below the jaws" : "below the tool";
     for (const [name, text] of Object.entries(words)) document.querySelector(`.${name} + span`).textContent = text;
     document.querySelector("i.held").hidden = !inputs.held;
+    field("probe").parentElement.hidden = !inputs.touching;
     for (const name of ["footprint", "held", "probe"]) document.querySelector(`i.${name}`).style.background = inputs.ink[name];
   }
   close() {
