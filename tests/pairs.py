@@ -34,6 +34,7 @@ BASE: Study = {
     "solve": {"exact": False},
 }
 _HELD = {"below": "-16 mm"}
+_WEIGHT = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]
 _CHOSEN_BY_ACCURACY = ("epsilon", "fine", "coarse", "rim", "growth")
 
 
@@ -267,6 +268,8 @@ def _loose(study: Study) -> None:
     flap = {"name": "flap", "thickness": "4 mm", "young": "20 kPa", "poisson": 0.3, "density": "1060 kg/m^3"}
     study["body"].setdefault("layer", []).insert(0, flap | {"contact": "unilateral", "friction": "stick"})
     study["probe"].setdefault("contact", "unilateral")
+    if study["body"].get("region"):  # one that swells would lift a flap without weight
+        study.setdefault("load", {}).setdefault("gravity", _WEIGHT)
 
 
 def _loose_region(study: Study) -> None:
@@ -373,7 +376,7 @@ FEATURES = (
     Feature("relaxing regions", "relaxation", _relaxing_regions),
     Feature("relaxing round scene", "relaxation", _relaxing_round_scene),
     Feature("relaxing under traction", "relaxation", _relaxing_under_traction),
-    Feature("gravity", "gravity", _update("load", gravity=["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"])),
+    Feature("gravity", "gravity", _update("load", gravity=_WEIGHT)),
     Feature("traction", "traction", _traction),
     Feature("free", "outside", _update("mesh", outside="free")),
     Feature("fixed", "outside", _update("mesh", outside="fixed")),
