@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from epsmesh.plan.plan import make_plan
 from epsmesh.run.execute import compute
+from epsmesh.run.measure import is_graded_to_contact
 from epsmesh.study.read import parse
 from tests.cases import NO_SIZES, raw, refusal
 
@@ -82,6 +83,16 @@ def test_each_jaw_has_elements_in_proportion_to_its_own_contact():
     (solve,) = make_plan(parse(scene(SLICE, jaws(BALL, {"radius": "20 mm"})))).solves
     for mesh in (solve.case.mesh, *(rung.mesh for rung in solve.later)):
         assert mesh.jaw_rim == pytest.approx(2 * mesh.rim, rel=0.03)
+
+
+@pytest.mark.parametrize(("radii", "graded"), [(("5 mm", "5 mm"), True), (("5 mm", "0.2 mm"), False)])
+def test_a_mesh_is_graded_if_it_is_to_both_jaws(radii, graded):
+    """Of jaws that differ, it does not matter which one is the first."""
+    mesh = {"epsilon": "full", "fine": "5 mm", "coarse": "5 mm", "rim": "0.2 mm", "growth": 0.3}
+    for first, second in (radii, radii[::-1]):
+        shallow = BALL | {"radius": first, "depth": "0.1 mm"}
+        (case,) = parse(scene(SLICE, jaws(shallow, {"radius": second}), mesh=NO_SIZES | mesh)).cases()
+        assert is_graded_to_contact(case) == graded
 
 
 def test_a_pull_is_refused():

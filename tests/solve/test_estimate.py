@@ -211,6 +211,7 @@ def test_limit_of_a_ball_at_large_displacements():
     assert force == pytest.approx(1 - 1.08 * 0.02)
     assert left == pytest.approx(0.35 * 0.02)
     assert limit(0.001, 0.05, is_ball=True)[0][1] == pytest.approx(0.12 * 0.05)
+    assert limit(0.001, 0.05, is_ball=True, least=0.01)[0][1] == 0.01  # what no degree shows is left
     for options in ({}, {"is_ball": True, "has_others": True}, {"is_ball": True, "is_graded": False}):
         assert limit(0.02, 0.05, **options)[0] == [1.0, pytest.approx(bar)]
     (force, left), bar = limit(-0.02, 0.05, is_ball=True)

@@ -198,7 +198,7 @@ def is_ball(case: Case) -> bool:
         return False
     if not case.way.is_nonlinear:
         return True
-    gaps = held_gaps(case.body, case.probe, case.mesh).values()
+    gaps = [gap for tool in _tools(case) for gap in held_gaps(case.body, tool, case.mesh).values()]
     return not case.way.in_time and all(gap >= _FROM_HELD * max(radii) for gap in gaps)
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from epsmesh.arrays import FloatArray
 from epsmesh.plan.cost import features
 from epsmesh.plan.recipe import (
-    edge_width_of,
-    half_width_of,
     has_flat,
     has_sure_contact,
     has_sure_limit,
@@ -28,6 +26,7 @@ from epsmesh.shapes.body import Layered
 from epsmesh.shapes.contact import first_touch
 from epsmesh.shapes.frame import Vector
 from epsmesh.shapes.grasp import MIDDLE
+from epsmesh.shapes.probe import Probe
 from epsmesh.solve.contact_result import ContactResult, PullResult, RestResult
 from epsmesh.solve.convergence import Convergence
 from epsmesh.solve.estimate import is_fine, is_graded, unresolved
@@ -273,19 +272,21 @@ def _known_of(case: Case, force: Vector) -> Vector:
 
 def is_graded_to_contact(case: Case) -> bool:
     """Return whether the mesh of ``case`` is graded to the expected edge of contact, and that is enough."""
-    rim = _rim(case)
-    # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
-    found = not case.probe.is_flat
-    rim *= 1 - _ROUNDING if found else 1.0
-    if case.way.is_found:  # small elements surround the axis, so contact must be there
-        *beside, _ = first_touch(case.body, case.probe, case.frame)
-        if hypot(*beside) > _BESIDE * half_width_of(case):
-            return False
-        if is_ball(case) and not case.way.is_nonlinear and is_thin(case):
-            return False
+    if case.way.is_found and is_ball(case) and not case.way.is_nonlinear and is_thin(case):
+        return False
     # What Newton's method finds with a linear law needs smaller elements than at large displacements.
     sure = (has_sure_contact(case) or case.way.is_nonlinear) and case.mesh.degree == 2
-    return is_graded(rim, case.mesh.growth, found=found, large=case.way.is_large, sure=sure)
+    how = {"large": case.way.is_large, "sure": sure}
+    for tool, expected, size in _rims(case):
+        # The coarsest recipe equals the limit of `is_graded`: rounding must not exceed it.
+        rim = size / expected.edge_width * (1 - _ROUNDING if not tool.is_flat else 1.0)
+        if case.way.is_found:  # small elements surround the axis, so contact must be there
+            *beside, _ = first_touch(case.body, tool, tool.frame_on(case.body))
+            if hypot(*beside) > _BESIDE * expected.contact_width:
+                return False
+        if not is_graded(rim, case.mesh.growth, found=not tool.is_flat, **how):
+            return False
+    return True
 
 
 def least_bar(solve: Solve) -> float:
@@ -296,13 +297,20 @@ def least_bar(solve: Solve) -> float:
 
 def size_at_contact(case: Case) -> float:
     """Return the size of elements at the edge of contact, in units of its expected half width; of jaws, the larger."""
-    size, jaw = case.mesh.rim_size(case.probe.half_width) / half_width_of(case), case.expected_jaw
-    return size if jaw is None else max(size, case.mesh.jaw_rim_size(jaw.half_width) / jaw.contact_width)
+    return max(size / expected.contact_width for _, expected, size in _rims(case))
 
 
 def _rim(case: Case) -> float:
-    """Return the size of elements at the edge of contact, in units of the width that they resolve."""
-    return case.mesh.rim_size(case.probe.half_width) / edge_width_of(case)
+    """Return the size of elements at the edge of contact, in units of the width that they resolve; see above."""
+    return max(size / expected.edge_width for _, expected, size in _rims(case))
+
+
+def _rims(case: Case) -> list[tuple[Probe, Probe, float]]:
+    """Return each jaw, or the tool: as it is, as its contact is expected to end, and the size (m) of elements there."""
+    found = [(case.probe, case.expected, case.mesh.rim_size(case.probe.half_width))]
+    if case.jaw is not None and (expected := case.expected_jaw) is not None:
+        found.append((case.jaw, expected, case.mesh.jaw_rim_size(expected.half_width)))
+    return found
 
 
 def _front_length(case: Case) -> float:

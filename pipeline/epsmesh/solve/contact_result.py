@@ -20,12 +20,12 @@ class ContactResult:
     friction. Each has a 95 % bar in its own unit, NaN if unknown; ``rubbing`` is what those of the first two follow
     from.
     ``friction_bar`` is the relative bar on what friction adds to the force. ``sag`` (m) is the displacement of the
-    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere
-    the tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's
-    bar by the size of elements there. ``rests`` are what else touches the body: a support that lets go, a second jaw,
-    tissue. ``shift`` (m) is how far loads move the place of contact across the axis, NaN where the tool follows.
-    ``pull`` is what jaws do that are pulled. ``shortening`` (m) is how far a tool that deforms gives way on its axis,
-    with a 95 % bar (m).
+    first touch by loads, ``load_energy`` (J) their strain energy without probe. ``is_ended`` says that somewhere the
+    tool's own edge bounds the contact, where the pressure is singular. ``at_edge`` is the part of the area's bar by the
+    size of elements there, ``least`` the part of that on F which no degree shows. ``rests`` are what else touches the
+    body: a support that lets go, a second jaw, tissue. ``shift`` (m) is how far loads move the place of contact across
+    the axis, NaN where the tool follows. ``pull`` is what jaws do that are pulled. ``shortening`` (m) is how far a tool
+    that deforms gives way on its axis, with a 95 % bar (m).
     """
 
     area: float
@@ -42,6 +42,7 @@ class ContactResult:
     load_energy: float = nan
     is_ended: bool = False
     at_edge: float = 0.0
+    least: float = 0.0
     shift: float = nan
     rests: tuple["RestResult", ...] = ()
     pull: "PullResult | None" = None

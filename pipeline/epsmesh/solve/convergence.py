@@ -17,7 +17,8 @@ class Convergence:
     The solve adds the share ``plain`` of edges at the rim without quarter points. ``is_solved`` says
     that decrements at large displacements are not those of a linearisation, and ``is_ended`` that the tool's own edge
     bounds the contact. ``friction_bar`` is the part of the relative bar that the next degree does not reduce,
-    ``at_edge`` the relative bar on the contact's area for the element size alone.
+    ``at_edge`` the relative bar on the contact's area for the element size alone. ``least`` is the part of the relative
+    bar for what no degree shows: at sharp ends of jaws, and where a support has elements larger than its contact.
     """
 
     degree: int
@@ -35,3 +36,4 @@ class Convergence:
     is_ended: bool = False
     friction_bar: float = 0.0
     at_edge: float = 0.0
+    least: float = 0.0

@@ -182,7 +182,7 @@ def _extrapolate_found_large(
     of_ball = fitted.FOUND_BALL_AGAIN if known.is_linear else fitted.FOUND_LARGE
     centre, spread = of_ball if known.is_ball else fitted.FOUND_FLAT
     change = fitted.FOUND / 2 * decrements  # F_2 - F_3: see `found_again_bar`
-    least = fitted.FOUND_LARGE_AT_EDGE * known.at_edge * np.abs(stiffness)
+    least = max(fitted.FOUND_LARGE_AT_EDGE * known.at_edge, known.least) * np.abs(stiffness)
     return stiffness - centre * change, np.maximum(spread * change, least)
 
 

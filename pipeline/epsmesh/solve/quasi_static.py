@@ -314,6 +314,7 @@ def _with_bars(
 ) -> ContactResult:
     """Return a contact with its bars; the second jaw has those of the tool, ``relative`` on F, if it is its image."""
     found = replace(contact, bar=finer.area_bar, friction_bar=finer.friction_bar, at_edge=finer.at_edge)
+    found = replace(found, least=finer.least)
     bars = (RestBars(finer.area_bar, float(relative[0])),) if is_halved else finer.rests
     rests = tuple(rest.with_bars(own) for rest, own in zip(contact.rests, bars, strict=False))
     found = replace(found, rests=rests, shortening_bar=finer.shortening_bar)

@@ -186,7 +186,11 @@ class Solution:
         known = replace(known, plain=self.plain, is_solved=self.is_solved)
         if (contact := self.contact) is not None:
             known = replace(
-                known, is_ended=contact.is_ended, friction_bar=contact.friction_bar, at_edge=contact.at_edge
+                known,
+                is_ended=contact.is_ended,
+                friction_bar=contact.friction_bar,
+                at_edge=contact.at_edge,
+                least=contact.least,
             )
             stiffness, bars = extrapolate_found(self.stiffness, self.decrements, self.bars, known)
             best = replace(self, response=replace(self.response, stiffness=stiffness), bars=bars)

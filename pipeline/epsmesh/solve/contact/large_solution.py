@@ -198,14 +198,16 @@ class LargeContactSolution:
         at_end = of_end * max([here.at_sharp_end, *(rest.at_sharp_end for rest in self.rests)])
         degree = self.body.elements.degree
         decrement, bar = found_again_bar(share, at_edge, fitted.AT_EDGE_LARGE[degree], at_end=at_end)
-        bar = max([bar, *(rest.unresolved for rest in self.rests)])
-        if any(rest.unresolved > fitted.MOST_UNRESOLVED for rest in self.rests):
+        unresolved = [rest.unresolved for rest in self.rests]
+        bar = max([bar, *unresolved])
+        if any(share > fitted.MOST_UNRESOLVED for share in unresolved):
             raise LargeError("the contact with the support is smaller than elements there: use a smaller `fine`")
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue
         # beside it may come below the tool: it is no candidate, and how much the area lacks is unknown.
         of_area = nan if here.is_ended else bar + abs(finer.surface_contact.whole_area / here.whole_area - 1)
         found = estimate_of(finer.body.elements, here, self.depth, (decrement, bar), of_area)
-        found = replace(found, shortening_bar=bar * self.shortening + abs(finer.shortening - self.shortening))
+        of_tool = bar * self.shortening + abs(finer.shortening - self.shortening)
+        found = replace(found, shortening_bar=of_tool, least=max([at_end, *unresolved]))
         of_rests = (
             RestBars(
                 area=bar + rest.bar + abs(again.area.value / rest.area.value - 1),

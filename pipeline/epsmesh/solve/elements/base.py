@@ -53,7 +53,7 @@ class HierarchicalEstimate:
     ``columns`` are the solutions in ``elements`` of that degree, if requested. ``decrements`` (n, n), J, is the
     reduction of the energies, None if the columns give it. ``unseen`` (n), J, are N of mixed elements. ``relative`` (n)
     are 95 % bars, None if they follow from both. ``area_bar`` is that on the area of unilateral contact,
-    ``at_edge`` what the size of the elements at its edge has of it.
+    ``at_edge`` what the size of the elements at its edge has of it. ``least`` is what no degree shows of ``relative``.
     ``rests`` are the bars of what touches the body besides the tool. ``pull`` is what jaws do that are pulled, with its
     bars; ``shortening_bar`` (m) that on how far a tool gives way.
     ``friction_bar`` is the part of ``relative`` for what friction adds to the force, which is not from the next degree.
@@ -67,6 +67,7 @@ class HierarchicalEstimate:
     relative: FloatArray | None = None
     area_bar: float = nan
     at_edge: float = 0.0
+    least: float = 0.0
     rests: tuple[RestBars, ...] = ()
     friction_bar: float = 0.0
     pull: PullResult | None = None
