@@ -11,6 +11,7 @@ from epsmesh.mesh.of_case import mesh_arrays
 from epsmesh.scene.model import PROBE, TOOL
 from epsmesh.solve.compiled import vector_space
 from epsmesh.solve.contact.surface import find_candidates
+from epsmesh.solve.estimate import unresolved
 from tests.cases import NO_SIZES, raw, refusal, solve, study
 
 BALL: dict[str, Any] = {"shape": "sphere", "radius": "5 mm", "depth": "0.2 mm", "contact": "unilateral"}
@@ -107,6 +108,13 @@ def test_the_bars_cover_a_finer_mesh(probe):
 
 
 @pytest.mark.nightly
+def test_elements_larger_than_the_contact_widen_all_bars():
+    found = one(mesh=MESH | {"rim": "3 mm", "fine": "4 mm"})
+    least = unresolved(3e-3 / (5e-3 * 0.2e-3) ** 0.5)
+    assert found.force_error >= least
+    assert found.largest["tool_shortening_error"] >= least * found.largest["tool_shortening"]
+
+
 def test_the_work_of_the_tool_is_the_energy_of_tissue_and_tool():
     shares = np.linspace(0, 1, 5)[1:]
     depths = [f"{0.2 * share**2:.6g} mm" for share in shares]

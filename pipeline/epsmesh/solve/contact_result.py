@@ -68,10 +68,12 @@ class ContactResult:
         return f"loads move the tissue below the probe by {by}, which a linear law leaves in its place: {remedy}"
 
     def with_least_bar(self, share: float) -> "ContactResult":
-        """Return the contact with a relative bar on its area of at least ``share``, where it has one."""
+        """Return the contact with relative bars on area and shortening of at least ``share``, where it has them."""
         rests = tuple(rest.with_least_bar(share) for rest in self.rests)
         pull = None if self.pull is None else self.pull.with_least_bar(share)
-        return replace(self, bar=max(self.bar, share), rests=rests, pull=pull)  # max(nan, share) is NaN
+        shorter = max(self.shortening_bar, share * self.shortening)
+        # max(nan, share) is NaN
+        return replace(self, bar=max(self.bar, share), rests=rests, pull=pull, shortening_bar=shorter)
 
     def with_opposite(self, change: float, bar: float) -> "ContactResult":
         """Return the contact whose opposite carries a ``change`` of F (N), too, and has the relative ``bar`` of F."""
