@@ -209,4 +209,4 @@ def test_a_rounded_jaw_opposite_a_sharp_one_on_a_free_body_has_its_bar():
     other = closed(DISC | {"edge": "1 mm"}, {"edge": "0 mm"}, body={"fixed": "none"})
     assert other.force_error > 0.8 * found.force_error
     finer = closed(DISC, {"edge": "1 mm"}, body={"fixed": "none"}, mesh={"rim": "0.3 mm", "growth": 0.5, "degree": 3})
-    assert abs(found.force / finer.force - 1) < found.force_error < 0.05
+    assert abs(found.force / finer.force - 1) < found.force_error < 0.06

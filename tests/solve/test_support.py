@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from epsmesh.solve.contact.turned_tangent import tolerance_on_bed
 from tests import organs
 from tests.cases import ROUGH, raw, refusal, solve
 from tests.verification import known
@@ -32,6 +33,16 @@ def one(comm: MPI.Comm = MPI.COMM_SELF, **changes: Any) -> Any:
     """Return the record of one case."""
     (record,) = solve(comm, **changes).values()
     return record
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+def test_a_linear_solve_is_done_though_less_is_left_than_needed(rubs):
+    """PETSc refuses a tolerance of 1 and more."""
+    rough = tolerance_on_bed(1.0, rubs=rubs, is_tried=True)
+    assert rough <= 1e-3
+    for enough in (0.5, 5.0, 1e9):
+        assert tolerance_on_bed(enough, rubs=rubs, is_tried=False) == rough
+    assert tolerance_on_bed(1e-12, rubs=rubs, is_tried=False) == (1e-6 if rubs else 1e-8)
 
 
 def test_a_layer_that_is_pressed_at_a_point_lifts_off_at_the_radius_of_theory_at_any_load():

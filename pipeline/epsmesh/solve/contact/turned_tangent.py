@@ -33,6 +33,16 @@ _MOST_ITERATIONS = 300
 _ON_BED, _RUBBED, _TRIED, _TRIED_RUBBED, _SPARE = 1e-8, 1e-6, 1e-3, 1e-4, 0.1
 
 
+def tolerance_on_bed(enough: float, *, rubs: bool, is_tried: bool) -> float:
+    """Return the relative tolerance of a linear solve where nodes rest on a bed.
+
+    Far from the tool, nodes there carry little, and rough solves would judge them in the end. ``enough`` is the share
+    of the load that may be left then: above 1 if less is left already.
+    """
+    tried, least = (_TRIED_RUBBED, _RUBBED) if rubs else (_TRIED, _ON_BED)
+    return tried if is_tried else min(max(least, _SPARE * enough), tried)
+
+
 class TurnedTangent(ABC):
     """The tangent K - Σ λ H of a ``body`` with contact, in the unit of the forms. Methods are collective."""
 
@@ -248,10 +258,8 @@ class IteratedTangent(TurnedTangent):
             # Friction is corrected once an iteration, and then gains little: its nodes would be judged by rough solves.
             tolerance = FINE
         if constraint.resting is not None:
-            # Far from the tool, nodes on a bed carry little, and rough solves would judge them in the end.
-            tried, least = (_TRIED_RUBBED, _RUBBED) if rubs else (_TRIED, _ON_BED)
-            needed = max(least, _SPARE * target / norm if norm else 1.0)
-            tolerance = max(tried, needed) if constraint.is_tried else needed
+            enough = target / norm if norm else 1.0
+            tolerance = tolerance_on_bed(enough, rubs=rubs, is_tried=constraint.is_tried)
         for kind in ("tangent, mixed",) if is_mixed else ("tangent", "tangent, mixed"):
             how = {"ksp_rtol": tolerance, "ksp_max_it": _MOST_ITERATIONS}
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
