@@ -259,7 +259,8 @@ def _accuracy(study: Study) -> None:
 
 def _support(study: Study) -> None:
     """Let the body rest on a support that lets go, and find the contact of the tool with that of it."""
-    study["body"].update(fixed="none", support={"on": "bottom", "friction": "stick"})
+    part = dict(_HELD) if study["body"]["shape"] in ("surface", "image") else "bottom"
+    study["body"].update(fixed="none", support={"on": part, "friction": "stick"})
     study["probe"].setdefault("contact", "unilateral")
 
 

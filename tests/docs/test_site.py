@@ -67,7 +67,8 @@ def test_variables_that_few_studies_have_are_in_the_reference(site, name):
 
 def test_what_holds_a_body_is_told_of_each_kind_of_body():
     takes = {shape: key.takes for key in keys_of("body") if key.name == "fixed" for shape in key.shapes}
-    assert takes["surface"] == takes["ellipsoid"] == "{below = length}"
+    assert takes["ellipsoid"] == "{below = length}"
+    assert takes["surface"] == takes["image"] == '{below = length} | "none"'
     assert "face" in takes["cad"]
     assert "bottom" in takes["box"]
 

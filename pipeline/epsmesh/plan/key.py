@@ -27,7 +27,7 @@ from epsmesh.study.schema import Material, Mesh
 from epsmesh.units import canonical
 
 # Raise by hand when the same input gives another force: earlier records are then no longer used.
-PHYSICS_VERSION = 25
+PHYSICS_VERSION = 26
 
 # Keys of a probe without effect on the force of a case: action is a label, and an insertion has cases of its own.
 _UNPHYSICAL = ("action", "toughness", "insertion", "crack_shape")

@@ -217,7 +217,7 @@ def is_closed(case: Case) -> bool:
 
 def is_sure_opposite(case: Case) -> bool:
     """Return whether the limit of F does not depend on how the support that lets go of the body is resolved."""
-    return case.body.resting is None or (case.body.resting.is_flat and is_closed(case))
+    return case.body.resting is None or (case.body.resting.fits and is_closed(case))
 
 
 def _has_limit(case: Case) -> bool:

@@ -211,9 +211,10 @@ def _of_pull(pull: PullResult | None, bar: float) -> dict[str, float]:
 def _of_support(rest: RestResult, bars: Vector) -> dict[str, float]:
     """Return what a record has of a support that lets go, by the names in the dataset.
 
-    Its force differs from that of the tool by the weight of the body, and has the same error: ``bars`` (3), N.
+    Its force differs from that of the tool by the weight of the body, and has the same error: ``bars`` (3), N. Across
+    the axis of a tool, which is inclined to the support, a bar that is missing is that along it.
     """
-    across = zip(rest.normal, rest.force, bars, strict=True)
+    across = zip(rest.normal, rest.force, [bars[2] if isnan(bar) else bar for bar in bars], strict=True)
     parts = [(n * f, abs(n) * bar) for n, f, bar in across if abs(n) > _ROUNDING]
     return {
         "support_force": sum(force for force, _ in parts),

@@ -52,7 +52,7 @@ def beds_of(case: Case) -> tuple[Bed, ...]:
     resting, ground, turn = case.body.resting, case.body.ground, case.frame.turn
     found = list[Bed]()
     if resting is not None and ground is not None:
-        found.append(support_of(_turned(ground, turn), resting.friction))
+        found.append(support_of(_turned(ground, turn), resting.friction, fits=resting.fits))
     if case.jaw is not None:
         found.append(_jaw_of(case, case.jaw))
     if (loose := case.body.loose) is not None:

@@ -13,7 +13,7 @@ from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.half_plane import HalfPlane
 from epsmesh.shapes.part import Around, is_part_mirrored
 from epsmesh.shapes.regions import Embedded, Inclusion, Layer, Loose, Region
-from epsmesh.shapes.resting import Resting
+from epsmesh.shapes.resting import OnBottom, Resting
 from epsmesh.shapes.section import Section, Words, kept
 from epsmesh.shapes.segment import Segment
 from epsmesh.shapes.support import Below, Fixed, Support, support_of
@@ -197,8 +197,13 @@ class Body(Section, ABC):
 
     @property
     def ground(self) -> Ground | None:
-        """The surface of that support."""
-        return None
+        """The surface of that support, which the body at rest touches with its lowest points."""
+        return None if self.resting is None else self.resting.ground(self.heights[0], self.reach_below)
+
+    def reach_below(self, directions: FloatArray) -> float:
+        """Return the largest distance (m) of a point of the bottom from the z axis, in horizontal ``directions``
+        (n, 3), unit vectors; infinite without one."""
+        return inf
 
     @kept
     def hold(self) -> Support:
@@ -345,10 +350,7 @@ class Layered(Drawn):
     """A body with a flat top, and horizontal layers if any."""
 
     layer: Annotated[tuple[Layer, ...], Words("Layers of other materials, from the top down.", "[[body.layer]]")] = ()
-    support: Annotated[
-        Resting | None,
-        Words("Support that lets go: a rigid surface on which the body rests.", "[body.support]", default="none"),
-    ] = None
+    support: OnBottom = None
 
     @property
     def resting(self) -> Resting | None:
@@ -364,11 +366,6 @@ class Layered(Drawn):
                 return Loose(layer.name, self.places[number - 1], layer.friction, parts, height)
         loose = super().loose
         return None if loose is None or loose.place.startswith("layer") else loose
-
-    @property
-    def ground(self) -> Ground | None:
-        """The surface of that support."""
-        return None if self.support is None else self.support.ground(self.heights[0], self.reach_below)
 
     @abstractmethod
     def reach_below(self, directions: FloatArray) -> float:

@@ -12,11 +12,14 @@ from epsmesh.shapes.complex import TISSUE, Complex
 from epsmesh.shapes.facetted import Facetted
 from epsmesh.shapes.files.loaded import Loaded
 from epsmesh.shapes.section import Words
-from epsmesh.shapes.support import Below, Fixed
+from epsmesh.shapes.support import NONE, Below, Fixed
 from epsmesh.shapes.triangles import SurfaceError, Triangles
 
 # Increase by hand when the same file gives another place, mesh or force: older records are then not used.
 _VERSION = 2
+NO_NAMES = (
+    'must be a height in the frame of the file, {below = "-40 mm"}: its faces have no names; "none" with [body.support]'
+)
 _FEW = 32  # cached surfaces between regions
 
 
@@ -36,9 +39,9 @@ class FromFile(Facetted):
         Fixed,
         Words(
             "Support of the body: all tissue below a height, in the coordinates of the file. "
-            "Displacements are zero there.",
+            'Displacements are zero there. "none": the body rests on [body.support].',
             '{below = "-40 mm"}',
-            takes="{below = length}",
+            takes='{below = length} | "none"',
         ),
     ]
 
@@ -67,11 +70,8 @@ class FromFile(Facetted):
     @field_validator("fixed")
     @classmethod
     def _below_a_height(cls, fixed: Any) -> Any:
-        if not isinstance(fixed, Below) and not cls.HAS_NAMES:
-            raise PydanticCustomError(
-                "not_supported",
-                'must be a height in the frame of the file, {below = "-40 mm"}: its faces have no names',
-            )
+        if not isinstance(fixed, Below) and not cls.HAS_NAMES and fixed != NONE:
+            raise PydanticCustomError("not_supported", NO_NAMES)
         return fixed
 
     def model_post_init(self, context: Any, /) -> None:

@@ -2,21 +2,35 @@
 
 from collections.abc import Callable
 from math import sqrt
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from epsmesh.arrays import FloatArray
 from epsmesh.shapes.friction import Friction
 from epsmesh.shapes.ground import Ground
 from epsmesh.shapes.section import Problems, Section, Words, in_mm
+from epsmesh.shapes.support import Below
 from epsmesh.units import Length
 
 # Least radius of a hollow support, in units of the distance at which the body touches it: its wall is then inclined by
 # 30° to the bottom, and by 60° to the sides, which are not searched for contact.
 _WIDE = 2.0
 _PLANE = "plane"
+_BOTTOM = "bottom"
+
+
+def _on(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Below.read(value)
+    if value != _BOTTOM:
+        raise PydanticCustomError(
+            "not_supported",
+            "must be 'bottom' of a box or a cylinder; {below = \"-15 mm\"} of a surface or an image",
+        )
+    return value
 
 
 class Resting(Section):
@@ -25,8 +39,14 @@ class Resting(Section):
     # Its own name begins the dimensions of its sweeps.
     name: Annotated[str, Field(exclude=True), Words("Name in dimensions of sweeps.", '"support"')] = "support"
     on: Annotated[
-        Literal["bottom"],
-        Words("Part of the body that rests on the support: the bottom of a box or a cylinder.", '"bottom"'),
+        Literal["bottom"] | Below,
+        BeforeValidator(_on),
+        Words(
+            "Part of the body that may touch the support: the bottom of a box or a cylinder; of an organ all of its "
+            "surface below a height. The organ rests on its lowest point.",
+            '{below = "-40 mm"}',
+            takes='"bottom" | {below = length}',
+        ),
     ]
     shape: Annotated[
         Literal["plane", "cylinder", "sphere"],
@@ -61,6 +81,11 @@ class Resting(Section):
     def is_flat(self) -> bool:
         """Whether it is a plane."""
         return self.shape == _PLANE
+
+    @property
+    def fits(self) -> bool:
+        """Whether the body at rest touches it with all of the part that may touch it."""
+        return self.is_flat and self.on == _BOTTOM
 
     @property
     def across(self) -> tuple[tuple[float, float, float], ...]:
@@ -103,3 +128,24 @@ class Resting(Section):
                 f"must be at least {in_mm(least)}: the wall of a narrower one would touch the sides of the body, where "
                 "no contact is searched",
             )
+
+
+def _of_face(rest: Resting | None) -> Resting | None:
+    if rest is not None and isinstance(rest.on, Below):
+        raise PydanticCustomError("not_supported", "`on` must be 'bottom': a box or a cylinder rests on that face")
+    return rest
+
+
+def _of_organ(rest: Resting | None) -> Resting | None:
+    if rest is not None and not isinstance(rest.on, Below):
+        what = '`on` must be a height, {below = "-40 mm"}: the surface of an organ has no names'
+        raise PydanticCustomError("not_supported", what)
+    if rest is not None and not rest.is_flat:
+        raise PydanticCustomError("not_supported", "`shape` must be 'plane': an organ rests on a plane alone")
+    return rest
+
+
+_WORDS = Words("Support that lets go: a rigid surface on which the body rests.", "[body.support]", default="none")
+# The table of a body with a bottom, and that of an organ.
+OnBottom = Annotated[Resting | None, AfterValidator(_of_face), _WORDS]
+OnLowest = Annotated[Resting | None, AfterValidator(_of_organ), _WORDS]

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
 from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.resting import OnLowest, Resting
 from epsmesh.shapes.section import Section, Words
 from epsmesh.units import Coordinate, canonical, parse_quantity
 
@@ -48,6 +49,13 @@ class Segmented(FromFile):
             takes="length | voxels",
         ),
     ] = None
+
+    support: OnLowest = None
+
+    @property
+    def resting(self) -> Resting | None:
+        """The support that lets go."""
+        return self.support
 
     @property
     @abstractmethod

@@ -55,8 +55,8 @@ class Support(ABC):
         """Return the heights z (m) at which the support ends in the middle of a face."""
         return ()
 
-    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
-        """Report what cannot work on a body between two ``heights`` (m), with elements of size ``fine`` (m).
+    def check(self, key: str, heights: tuple[float, float], fine: float, problems: Problems) -> None:
+        """Report what cannot work of a ``key`` of a body between ``heights`` (m), with elements of size ``fine`` (m).
 
         Names of faces are validated with the study.
         """
@@ -137,17 +137,17 @@ class Below(BaseModel, Support):
         """Return the height."""
         return (self.below,)
 
-    def check(self, heights: tuple[float, float], fine: float, problems: Problems) -> None:
+    def check(self, key: str, heights: tuple[float, float], fine: float, problems: Problems) -> None:
         """Report a height outside the body, or so near one of its ends that elements would be slivers."""
         low, high = heights
         found = f"below {in_mm(self.below)}"
         if not low < self.below < high:
-            problems.error("body.fixed", found, f"must be inside the body: between {in_mm(low)} and {high * 1e3:g} mm")
+            problems.error(key, found, f"must be inside the body: between {in_mm(low)} and {high * 1e3:g} mm")
             return
         strip = min(high - self.below, self.below - low)
         if strip < fine / _LONGEST_NEEDLE < float("inf"):
             problems.error(
-                "body.fixed",
+                key,
                 found,
                 f"leaves a strip of {in_mm(strip)} at the side, too thin for elements of {in_mm(fine)}: "
                 f"use fine = {in_mm(_LONGEST_NEEDLE * strip)} at most, or another level",

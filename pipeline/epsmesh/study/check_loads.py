@@ -5,15 +5,16 @@ from itertools import product
 from math import dist, inf
 from typing import cast
 
-from epsmesh.shapes.body import Body, Layered
+from epsmesh.shapes.body import Body
 from epsmesh.shapes.frame import PlaceError
 from epsmesh.shapes.friction import STICK
-from epsmesh.shapes.from_file import FromFile
+from epsmesh.shapes.from_file import NO_NAMES, FromFile
 from epsmesh.shapes.part import FREE, Cap
 from epsmesh.shapes.probe import Probe
 from epsmesh.shapes.regions import Embedded
 from epsmesh.shapes.registry import TERMS
 from epsmesh.shapes.section import Section, in_mm
+from epsmesh.shapes.segmented import Segmented
 from epsmesh.shapes.support import NONE, Faces, NamedFace
 from epsmesh.study.axis import Axis
 from epsmesh.study.loads import Load, Traction
@@ -82,8 +83,10 @@ def _check_capsules(body: Body, problems: Problems) -> None:
 
 def _check_rest(body: Body, problems: Problems) -> None:
     """Report a body that is fixed as well as it rests on a support that lets go, and one that this does not fit."""
-    if isinstance(body, Layered) and body.support is not None:
-        body.support.check(body.reach_below, problems)
+    if body.resting is not None:
+        body.resting.check(body.reach_below, problems)
+    elif isinstance(body, Segmented) and body.fixed == NONE:
+        problems.error("body.fixed", NONE, NO_NAMES)
     if body.resting is not None and body.fixed != NONE:
         held = 'must be "none" with [body.support]: the part that rests on it is not fixed, nor is another'
         problems.error("body.fixed", body.model_dump()["fixed"], held)

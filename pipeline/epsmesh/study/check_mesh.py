@@ -166,7 +166,8 @@ def check_epsilon(mesh: Mesh, probe: Probe, problems: Problems) -> None:
 
 def check_support(body: Body, mesh: Mesh, problems: Problems) -> None:
     """Report a support that elements cannot follow."""
-    body.hold.check(body.heights, mesh.fine, problems)
+    key = "body.fixed" if body.resting is None else "body.support.on"
+    body.hold.check(key, body.heights, mesh.fine, problems)
 
 
 def check_locking(body: Body, material: Material, mesh: Mesh, probe: Probe, problems: Problems) -> None:

@@ -48,7 +48,7 @@ class Bed:
     The body at rest touches it. ``height`` are its heights (m) at rest above points (n, 3) of the undeformed surface,
     along its axis, ``normal``: the unit vector from the bed into the body, in the mean. On it tissue has Coulomb's
     coefficient ``friction``. ``sticks`` says that tissue which touches it is held where that was at rest, without a
-    path of friction. A plane ``is_flat``.
+    path of friction. A support ``fits`` that touches all of its candidates at rest.
 
     It is a support, or a jaw that has an edge: ``ends_at`` is a mask of points (n, 3) on the edge of its candidates,
     true where it ends itself. A jaw advances along its normal by ``pace`` times the tool's depth; ``foot`` (m) is on
@@ -62,7 +62,7 @@ class Bed:
     height: Callable[[FloatArray], FloatArray]
     friction: float = 0.0
     sticks: bool = False
-    is_flat: bool = True
+    fits: bool = True
     pace: float = 0.0
     ends_at: Callable[[FloatArray], BoolArray] | None = None
     foot: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -143,11 +143,10 @@ class Bed:
         return replace(self, distance=distance)
 
 
-def support_of(ground: Ground, friction: float) -> Bed:
-    """Return the support whose surface is the ``ground``. A plane is touched at rest, where tissue then sticks."""
-    is_flat = not ground.across
-    sticks = is_flat and friction == inf
-    return Bed(lambda points, _: ground.distance(points), ground.normal, ground.height, friction, sticks, is_flat)
+def support_of(ground: Ground, friction: float, *, fits: bool) -> Bed:
+    """Return the support whose surface is the ``ground``. What ``fits`` is touched at rest, and tissue sticks there."""
+    sticks = fits and friction == inf
+    return Bed(lambda points, _: ground.distance(points), ground.normal, ground.height, friction, sticks, fits)
 
 
 def tissue_below(tissue: LooseTissue, friction: float, *, is_level: bool) -> Bed:

@@ -8,12 +8,15 @@ from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
 from epsmesh.solve.contact.bed import Bed, Resting
 from epsmesh.solve.contact.checks import check_edge
+from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.tool import Tool
 from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 
 # Height below which nodes of a support touch it at first, in units of the depth.
 _NEXT = 0.5
+# Heights that differ by this share of all of them are the same: rounding.
+_SAME = 1e-9
 # Between tissues that both strain much, a node that returns may penetrate freely, and pull where it stuck before: no
 # set has neither. It may then penetrate so many times as much.
 _YIELDING = 10.0
@@ -70,6 +73,16 @@ def check_edges(body: DeformedBody, tool: Tool, touched: ContactSolution) -> Non
             check_edge(ends_at, part.candidates, part.of(touched.active))
 
 
+def _lowest(candidates: Candidates, bed: Bed) -> BoolArray:
+    """Return the nodes (n) no higher above a ``bed``, at rest, than those of the lowest facet.
+
+    What is held along the bed there alone slides elsewhere, as without friction.
+    """
+    heights = bed.height(candidates.points)
+    of_facets = heights[candidates.facets]
+    return np.asarray(heights <= of_facets[of_facets.mean(axis=1).argmin()].max() + _SAME * np.ptp(heights))
+
+
 def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
     """Return the nodes on the beds of a ``tool`` at a ``depth`` (m); without an earlier contact, those touch that are
     next to a support."""
@@ -79,7 +92,7 @@ def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
     for number, bed in enumerate(tool.beds, start=1):
         part = body.part(number)
         (supports if bed.is_support else jaws).append(part.mask(count))
-        nodes[part.nodes], stick[part.nodes] = True, bed.sticks
+        nodes[part.nodes], stick[part.nodes] = True, bed.sticks and (bed.fits or _lowest(part.candidates, bed))
         if bed.is_support:
             heights = bed.height(part.candidates.points)
             begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth

@@ -108,10 +108,10 @@ class Rest:
     def slip(self) -> float:
         """The largest distance (m) by which a node in contact has gone along the bed, from where it was at rest.
 
-        It is unknown on a round bed, which nodes meet on their way.
+        It is unknown on a bed that nodes meet on their way.
         """
-        if self.bed.sticks or not self.bed.is_flat:
-            return 0.0 if self.bed.is_flat else nan
+        if self.bed.sticks or not self.bed.fits:
+            return 0.0 if self.bed.fits else nan
         normal = self.touched.normal[self.touched.active]
         moved = self.moved[self.touched.active]
         along = moved - np.einsum("ni,ni->n", moved, normal)[:, None] * normal

@@ -4,6 +4,7 @@ Loads grow in proportion. With friction the settled state depends on that path, 
 """
 
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 
@@ -100,12 +101,12 @@ def without_friction(space: ElasticSpace, tool: Tool, *, is_loaded: bool) -> Too
     It slides, and the body on its support, too, unless nothing but friction holds it there: it then sticks.
 
     Raises:
-        SolveError: if nothing but friction holds it, and no load presses it on before the tool comes.
+        SolveError: if nothing but a coefficient of friction holds it, and no load presses it on before the tool comes.
     """
     try:
         check_hold(space, [(np.array(bed.normal), bed.sticks) for bed in tool.beds if not bed.is_tissue])
     except SolveError:
-        if not is_loaded:
+        if not is_loaded and any(bed.drags and bed.friction < inf for bed in tool.beds):
             raise
         return replace(tool, beds=tuple(bed.holding() for bed in tool.beds))
     return tool

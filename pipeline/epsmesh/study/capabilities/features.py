@@ -236,9 +236,9 @@ def _is_curved_support(scene: Scene) -> bool:
 
 
 def _has_path_on_support(scene: Scene) -> bool:
-    """Return whether friction with a support that lets go is followed: tissue sticks to a plane from the beginning."""
-    friction = 0.0 if scene.body.resting is None else scene.body.resting.friction
-    return friction > 0 and (friction < inf or _is_curved_support(scene))
+    """Return whether friction with a support that lets go is followed: a bottom sticks to a plane from the start."""
+    rest = scene.body.resting
+    return rest is not None and rest.friction > 0 and (rest.friction < inf or not rest.fits)
 
 
 def _is_middle(scene: Scene) -> bool:
@@ -354,6 +354,9 @@ FEATURES: dict[str, Feature] = {
     "support that lets go": Feature("body.support", lambda s: s.body.resting is not None),
     "support with a path of friction": Feature(
         "body.support.friction", _has_path_on_support, where=_of_support("friction"), write=_coefficient
+    ),
+    "support of an organ": Feature(
+        "body.support.on", lambda s: s.body.resting is not None and isinstance(s.body, FromFile), write=lambda _: None
     ),
     "hollow support": Feature("body.support.hollow", lambda s: s.body.resting is not None and s.body.resting.hollow),
     "curved support": Feature("body.support.shape", _is_curved_support, where=_of_support("shape")),

@@ -294,6 +294,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "support that lets go",
         "ends where a support begins, and tissue that lifts off would lie bare: omit it, or [body.support]",
     ),
+    Refusal(
+        "support of an organ",
+        "accuracy",
+        "has contact where meshes of an accuracy do not refine it, at the lowest points of the organ: give sizes",
+    ),
     Refusal("support that lets go", "time steps", f"{_IN_STEPS}, in which tissue lifts off no support: {_STATIC}"),
     *(Refusal(name, "support that lets go", _LIFTS) for name in ("influence", "spread")),
     # A loose layer: its contact with the tissue below is found with that of the tool.
