@@ -22,6 +22,9 @@ _WEIGHT = 1e-3
 _FINITE, _ALIGNED = 2e-2, 1e-3
 _FRICTION = 0.3
 _TOGETHER = {"together": "grasp"}
+# Of two bodies that are large beside their contact, and no half-spaces.
+_FINITE_BODIES = 5e-3
+_HERTZ = "H. Hertz (1882)"
 _GRAVITY, _DENSITY = 9.81, 1060.0
 # Of a strip as a beam, whose overhang is ten times its thickness; of forces that the solver balances.
 _BEAM, _BALANCED = 3e-2, 1e-7
@@ -36,6 +39,7 @@ def contacts_rows(comm: MPI.Comm, *, quick: bool = False) -> Iterator[Row]:
         yield _on_a_ridge(comm)
         yield from _grasps(comm)
         yield _between_balls(comm)
+        yield from elastic_rows(comm)
         yield from _pulled(comm)
 
 
@@ -128,7 +132,22 @@ def _between_balls(comm: MPI.Comm) -> Row:
     modulus = _YOUNG / (1 - _POISSON**2)
     force = 4 / 3 * modulus * found.contact_radius**3 / (1e-3 * radius)
     bar = 3 * found.contact_radius_error
-    return Row("block between two balls, at the computed radius", "3D", force, "H. Hertz (1882)", found.force, bar)
+    return Row("block between two balls, at the computed radius", "3D", force, _HERTZ, found.force, bar)
+
+
+def elastic_rows(comm: MPI.Comm) -> Iterator[Row]:
+    """F and the radius of contact of a ball on a block of another modulus, both 400 radii of the contact large."""
+    radius, depth = 100.0, 0.0025
+    width = sqrt(1e-6 * radius * depth)
+    for name, ratio in (("a third of", 1 / 3), ("equal to", 1.0), ("three times", 3.0)):
+        probe = _ball(radius, depth) | tissue(_POISSON, 1e-3 * _YOUNG * ratio)
+        found = _record(comm, box(400, 400, 200), probe, _sizes(0.03, 40) | {"growth": 0.3})
+        modulus = _YOUNG / (1 - _POISSON**2) / (1 + 1 / ratio)
+        force = 4 / 3 * modulus * width * 1e-3 * depth
+        scene = f"elastic ball on a block, E {name} its own"
+        more = _FINITE_BODIES, found.message
+        yield Row(f"{scene}: F", "3D", force, _HERTZ, found.force, found.force_error, *more)
+        yield Row(f"{scene}: radius (m)", "3D", width, _HERTZ, found.contact_radius, found.contact_radius_error, *more)
 
 
 def _pulled(comm: MPI.Comm) -> Iterator[Row]:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from epsmesh import cli, verify
 from epsmesh.verify import Row
-from tests.verification import known, rollers, table
+from tests.verification import contacts, known, rollers, table
 from tests.verification.bodies import body_rows
 from tests.verification.boundary import rectangle_stiffness
 from tests.verification.capsules import capsule_rows
@@ -86,3 +86,10 @@ def test_rows_of_the_roller_are_within_half_a_per_cent():
     found = list(rollers.roller_rows(MPI.COMM_SELF))
     assert len(found) == 3
     assert all(row.is_right and abs(row.error) < 5.5e-3 for row in found)
+
+
+@pytest.mark.nightly
+def test_rows_of_two_elastic_bodies_are_within_half_a_per_cent():
+    found = list(contacts.elastic_rows(MPI.COMM_SELF))
+    assert len(found) == 6
+    assert all(row.is_right and abs(row.error) < 4e-3 for row in found)
