@@ -1,5 +1,7 @@
 """Conjugate gradients with multigrid: accurate for F, balanced near locking, independent of the mesh size."""
 
+from contextlib import ExitStack
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -45,6 +47,34 @@ def test_forces_that_do_not_balance_are_a_failure():
         pytest.raises(SolveError, match="do not balance"),
     ):
         problem.solve(law(0.3), PRESS, method="iterative", tolerance=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["tangent", "tangent, mixed"])
+def test_a_solver_of_tangents_that_ends_at_its_last_iteration_has_not_converged(kind):
+    """PETSc's GCR calls that a success: here with more than half of the residual left."""
+    matrix = PETSc.Mat().createAIJ(50, nnz=3, comm=PETSc.COMM_SELF)
+    for row in range(50):
+        columns = [column for column in (row - 1, row, row + 1) if 0 <= column < 50]
+        matrix.setValues([row], columns, [2.0 if column == row else -1.0 for column in columns])
+    matrix.assemble()
+    rhs, unknown = matrix.createVecs()
+    rhs.set(1.0)
+    plain = PETSc.PC().create(PETSc.COMM_SELF)
+    plain.setOperators(matrix)
+    plain.setType("none")
+    with ExitStack() as stack:
+        ksp = krylov.solver_of(kind, matrix, stack, plain, ksp_max_it=10)
+        ksp.solve(rhs, unknown)
+        left = rhs - matrix * unknown
+        assert left.norm() > 0.5 * rhs.norm()
+        assert not krylov.has_converged(ksp)
+        with pytest.raises(SolveError, match="diverged_max_it after 10 iterations"):
+            krylov.check_converged(ksp)
+        enough = krylov.solver_of(kind, matrix, stack, plain, ksp_max_it=200)
+        unknown.set(0.0)
+        enough.solve(rhs, unknown)
+        assert krylov.has_converged(enough)
+        assert 10 < krylov.check_converged(enough) < 200
 
 
 def test_what_does_not_converge_is_a_failure():

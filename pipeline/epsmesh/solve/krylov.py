@@ -99,16 +99,27 @@ def explain(error: PETSc.Error) -> str:
     }.get(error.ierr, f"PETSc error {error.ierr}")
 
 
+def has_converged(ksp: PETSc.KSP) -> bool:
+    """Return whether the last solve converged.
+
+    At the largest number of iterations PETSc's GCR reports KSP_CONVERGED_ITS, whatever the residual is. That reason is
+    one of success of solvers without a test alone, such as a factorisation.
+    """
+    reason = ksp.getConvergedReason()
+    is_ended = ksp.getType() == PETSc.KSP.Type.GCR and reason == PETSc.KSP.ConvergedReason.CONVERGED_ITS
+    return bool(reason > 0 and not is_ended)
+
+
 def check_converged(ksp: PETSc.KSP) -> int:
     """Return the iterations of the last solve.
 
     Raises:
         SolveError: if it did not converge.
     """
-    reason = ksp.getConvergedReason()
-    if reason <= 0:
+    if not has_converged(ksp):
+        reason = ksp.getConvergedReason()
         names = {v: k for k, v in vars(PETSc.KSP.ConvergedReason).items() if isinstance(v, int)}
-        name = names.get(reason, str(reason)).lower()
+        name = names.get(reason, str(reason)).lower() if reason <= 0 else "diverged_max_it"
         raise SolveError(f"the linear solver did not converge: {name} after {ksp.its} iterations")
     return int(ksp.its)
 

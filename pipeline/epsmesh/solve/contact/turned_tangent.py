@@ -23,7 +23,16 @@ from epsmesh.solve.elements.mixed import MixedElements, MixedSolver
 from epsmesh.solve.elements.pressures import without_columns
 from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.kernels.pressure import matrix_of
-from epsmesh.solve.krylov import INDEFINITE, check_converged, explained, factorised, is_truncated, keep, solver_of
+from epsmesh.solve.krylov import (
+    INDEFINITE,
+    check_converged,
+    explained,
+    factorised,
+    has_converged,
+    is_truncated,
+    keep,
+    solver_of,
+)
 from epsmesh.solve.newton import FINE, forcing
 from epsmesh.solve.physics import MaterialLaw
 
@@ -265,7 +274,7 @@ class IteratedTangent(TurnedTangent):
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
             found.set(0.0)
             ksp.solve(load, found)
-            if ksp.getConvergedReason() > 0 or (constraint.is_there and is_truncated(ksp, found)):
+            if has_converged(ksp) or (constraint.is_there and is_truncated(ksp, found)):
                 break
             # Conjugate gradients end where the tangent is indefinite, as far from equilibrium.
             if ksp.getConvergedReason() == INDEFINITE and isinstance(self._solver, DisplacementSolver):
