@@ -140,7 +140,7 @@ def test_a_layer_that_floats_says_so():
     ("changes", "said"),
     [
         ({"body": flap(), "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"}}, 'must be "unilateral"'),
-        ({"body": flap(), "material": {"law": "neo-hookean"}}, "body.layer[1].friction"),
+        ({"body": flap(0.2), "material": {"law": "neo-hookean"}}, "body.layer[1].friction"),
         ({"body": {"layer": [FLAP | {"friction": 0.2}]}}, "what is bonded does not slide"),
         ({"body": {"layer": [FLAP | {"contact": "unilateral", "thickness": None}]}}, "no tissue is below it"),
         (

@@ -199,7 +199,7 @@ def test_organs_of_an_image_press_on_each_other(organs):
         ({"body": ball(0.2, contact="bonded")}, "what is bonded does not slide"),
         ({"body": ball(capsule={"young": "1 MPa", "thickness": "0.2 mm"})}, "below a capsule"),
         ({"body": ball(), "probe": {"shape": "disc", "radius": "3 mm", "depth": "0.2 mm"}}, 'must be "unilateral"'),
-        ({"body": ball(), "material": {"law": "neo-hookean"}}, "body.inclusion[1].friction"),
+        ({"body": ball(0.2), "material": {"law": "neo-hookean"}}, "body.inclusion[1].friction"),
     ],
 )
 def test_what_is_not_computed_is_refused(changes, said):

@@ -164,8 +164,8 @@ def tissue_below(tissue: LooseTissue, friction: float, *, is_level: bool) -> Bed
 class Resting:
     """The ``nodes`` (n) above beds, among all that may be touched; those that touch at the start of a path, ``begin``.
 
-    In a loop without friction, those that ``stick`` (n) are held at ``anchors`` (n, 3), m, where they touch. Where sets
-    repeat, they may penetrate ``yielding`` times as much as before. ``jaws`` are masks (n) of those of each second jaw.
+    In a loop without friction, those that ``stick`` (n) are held at ``anchors`` (n, 3), m, where they touch. Those that
+    ``yields`` (n) marks may penetrate more where sets repeat. ``jaws`` are masks (n) of those of each second jaw.
     Of ``holds`` (n), masks, each has a node that touches, or the body floats: nothing else holds it.
     """
 
@@ -173,6 +173,6 @@ class Resting:
     begin: BoolArray
     stick: BoolArray
     anchors: FloatArray
-    yielding: float
+    yields: BoolArray
     jaws: tuple[BoolArray, ...] = ()
     holds: tuple[BoolArray, ...] = ()

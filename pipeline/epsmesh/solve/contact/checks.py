@@ -14,10 +14,9 @@ from epsmesh.solve.newton import LargeError
 
 
 class StoringTissue(SteppedTissue, Protocol):
-    """Tissue with nodes whose ``places`` (n, d) at rest are known, and with its ``energy``; NaN if J <= 0."""
+    """Tissue with ``displacements`` (n, d) of its nodes, and with its ``energy``; NaN if J <= 0."""
 
-    @property
-    def places(self) -> FloatArray: ...  # noqa: D102
+    def displacements(self) -> FloatArray: ...  # noqa: D102
     @property
     def energy(self) -> float: ...  # noqa: D102
 
@@ -58,7 +57,7 @@ def check_energy(tissue: StoringTissue, touched: ContactSolution, change: float,
     Raises:
         LargeError: if they do not.
     """
-    state, work = tissue.state, float((touched.forces * (tissue.positions() - tissue.places)).sum())
+    state, work = tissue.state, float((touched.forces * tissue.displacements()).sum())
     energies = []
     for share in (1 + change, 1 - change):
         tissue.state = share * state

@@ -46,7 +46,16 @@ class FacetNodes:
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the shape functions at points (q, 3) in barycentric coordinates, (q, k)."""
-        return np.asarray(np.linalg.solve(_monomials(self.degree, self.corners).T, _monomials(self.degree, points).T).T)
+        return np.asarray(_monomials(self.degree, points) @ self._coefficients)
+
+    def slopes(self, points: FloatArray) -> FloatArray:
+        """Return the derivatives (2, q, k) of the shape functions at points (q, 3), along the two sides at the first
+        corner."""
+        powers, coefficients = _powers(self.degree), self._coefficients
+        along = [
+            _monomials(self.degree, points, powers - one) * powers[:, i] for i, one in enumerate(np.eye(3, dtype=int))
+        ]
+        return np.array([(side - along[0]) @ coefficients for side in along[1:]])
 
     def normals(self, x: FloatArray) -> FloatArray:
         """Return the cross products (m, k, 3) of the sides of m facets with nodes ``x`` (m, k, 3), at their nodes."""
@@ -55,13 +64,13 @@ class FacetNodes:
 
     @cached_property
     def _slopes(self) -> FloatArray:
-        """The derivatives (2, k, k) of the shape functions at the nodes, along the two sides at the first corner."""
-        powers, coefficients = _powers(self.degree), np.linalg.inv(_monomials(self.degree, self.corners))
-        along = [
-            _monomials(self.degree, self.corners, powers - one) * powers[:, i]
-            for i, one in enumerate(np.eye(3, dtype=int))
-        ]
-        return np.array([(side - along[0]) @ coefficients for side in along[1:]])
+        """The derivatives (2, k, k) at the nodes."""
+        return self.slopes(self.corners)
+
+    @cached_property
+    def _coefficients(self) -> FloatArray:
+        """The shape functions as sums of monomials."""
+        return np.asarray(np.linalg.inv(_monomials(self.degree, self.corners)))
 
 
 def _powers(degree: int) -> IntArray:

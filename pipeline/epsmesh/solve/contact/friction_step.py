@@ -66,7 +66,8 @@ class FrictionIteration:
         self._single = self._single or state in self._seen
         others = ~self._simple.nodes if self._single else None
         following = self.slide.following(trial, most, now, friction_step.neighbours, others)
-        after = self._simple.sliding(following, now)
+        is_free = np.equal(self._with.friction, 0.0) & now
+        after = self._simple.sliding(replace(following, sliding=following.sliding | is_free), now)
         moves = before != now
         turns = (after.sliding != self.slide.sliding) & ~moves
         if moves.any() or turns.any():
@@ -133,7 +134,8 @@ class FrictionIteration:
 
     def sticks(self, active: BoolArray) -> BoolArray:
         """Return a mask (n) of the nodes that stick."""
-        return active & (~self.slide.sliding | (self._simple.law(self._with.friction) == np.inf))
+        law = self._simple.law(self._with.friction)
+        return active & (~self.slide.sliding | (law == np.inf)) & np.greater(self._with.friction, 0.0)
 
     def slips(self, place: "Placed") -> FloatArray:
         """Return the slips (n, d) since the references, m."""

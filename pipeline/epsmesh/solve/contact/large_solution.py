@@ -53,6 +53,8 @@ _SMALL = 1e-4
 _FOUND_AGAIN = 1e-3
 # Depth of tissue within that below it which is an error, in units of the tool's depth.
 _OVERLAPS = 0.05
+# Force beyond the edge of the tissue below which is an error, in units of the tool's; a smaller one is in the bar.
+_OVERHANGS = 0.01
 # Share of the depth to both sides of it over which the rate by the depth is taken.
 _NEARBY = 1e-3
 
@@ -152,7 +154,17 @@ class LargeContactSolution:
             raise LargeError(
                 "tissue that has lifted off the tissue below comes to another place of it: use a smaller depth"
             )
+        if self._overhang > _OVERHANGS:
+            raise LargeError(
+                "loose tissue slides beyond the edge of the tissue below and presses there: use a smaller depth, or "
+                "let it end before that edge"
+            )
         check_energy(self.body, self.touched, _SMALL)
+
+    @property
+    def _overhang(self) -> float:
+        """The force with which loose tissue presses beyond the edge of that below, in units of the tool's."""
+        return self.body.overhang(self.touched.forces) / self.force
 
     def response(self, movement: Movement) -> Response:
         """Return the force at this depth as a stiffness, F/d."""
@@ -199,7 +211,7 @@ class LargeContactSolution:
         degree = self.body.elements.degree
         decrement, bar = found_again_bar(share, at_edge, fitted.AT_EDGE_LARGE[degree], at_end=at_end)
         unresolved = [rest.unresolved for rest in self.rests]
-        bar = max([bar, *unresolved])
+        bar = max([bar, *unresolved]) + self._overhang
         if any(share > fitted.MOST_UNRESOLVED for share in unresolved):
             raise LargeError("the contact with the support is smaller than elements there: use a smaller `fine`")
         # F is nearly stationary with respect to the area, which has a bar of its own. Where the tool ends, tissue

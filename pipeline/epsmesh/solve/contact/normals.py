@@ -31,8 +31,7 @@ def nodal_normals(candidates: Candidates, pressed: FloatArray, means: FloatArray
     bears[candidates.facets[:, _bears(candidates.shape)]] = True
     signs = np.where(np.einsum("ni,ni->n", pressed, around) < 0, -1.0, 1.0)
     normal = np.where(bears[:, None], signs[:, None] * pressed, around)
-    normal = np.where(free.any(axis=1)[:, None], free * normal, normal)
-    return np.asarray(normal / np.linalg.norm(normal, axis=1)[:, None])
+    return within_planes(normal, free)
 
 
 def deformed_normals(candidates: Candidates, points: FloatArray, at_rest: FloatArray, free: FloatArray) -> FloatArray:
@@ -46,7 +45,12 @@ def deformed_normals(candidates: Candidates, points: FloatArray, at_rest: FloatA
     side = np.sign(np.einsum("mki,mki->m", before, at_rest[facets]))
     found = np.zeros_like(points)
     np.add.at(found, facets, side[:, None, None] * now)
-    found = np.where(free.any(axis=1)[:, None], free * found, found)
+    return within_planes(found, free)
+
+
+def within_planes(normals: FloatArray, free: FloatArray) -> FloatArray:
+    """Return unit ``normals`` (n, 3) without components that are not ``free`` (n, 3), unless none is."""
+    found = np.where(free.any(axis=1)[:, None], free * normals, normals)
     return np.asarray(found / np.linalg.norm(found, axis=1)[:, None])
 
 

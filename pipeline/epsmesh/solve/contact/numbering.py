@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -82,6 +82,19 @@ class Numbering:
         return np.asarray(3 * self.local[self.is_owned][:, None] + np.arange(3))
 
 
+class Below(Protocol):
+    """What is below n nodes, of values at nodes of the surface below, where loose tissue has slid."""
+
+    def below(self, values: FloatArray) -> FloatArray:
+        """Return the values (n, k) below the nodes."""
+
+    def hand_on(self, forces: FloatArray) -> FloatArray:
+        """Return the forces on the surface below, of ``forces`` (n, k) on the nodes."""
+
+    def matrix(self) -> sp.csr_matrix:
+        """Return the first as a matrix."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pairs:
     """Pairs of nodes of two surfaces that touch: ``upper`` and ``lower`` ones, n each, at the same places.
@@ -104,6 +117,7 @@ class Pairs:
     normal: FloatArray
     frames: FloatArray
     tied: FloatArray
+    mortar: Below | None = None
 
     def holding(self, active: BoolArray, firm: BoolArray | None) -> "Pairs":
         """Return the pairs for ``active`` candidates (m), which are held along the normal, and ``firm`` ones."""
@@ -112,6 +126,20 @@ class Pairs:
         if firm is not None:
             tied[firm[self.nodes]] = 1.0
         return replace(self, tied=tied)
+
+    def meeting(self, mortar: Below, normal: FloatArray) -> "Pairs":
+        """Return the pairs where upper nodes have slid, by what is then below them, and a ``normal`` (n, 3)."""
+        frames = turned_frames(normal, self.free.any(axis=1))
+        return replace(self, mortar=mortar, normal=normal, frames=frames)
+
+    def below(self, values: FloatArray) -> FloatArray:
+        """Return what is below upper nodes (n, 3), of ``values`` on owned dofs; collective."""
+        found = self.lower.gather_vectors(values)
+        return found if self.mortar is None else self.mortar.below(found)
+
+    def _hand_on(self, into: np.ndarray, forces: FloatArray) -> None:
+        """Add ``forces`` (n, 3) at upper nodes to what is below them."""
+        self.lower.add_vectors(into, forces if self.mortar is None else self.mortar.hand_on(forces))
 
     @cached_property
     def _coupling(self) -> FloatArray:
@@ -122,22 +150,22 @@ class Pairs:
     def join(self, values: np.ndarray) -> None:
         """Multiply by S: displacements from those relative to the lower nodes."""
         self._turn(values, "nij,nj->ni")
-        self._add(self.lower, self.upper, values, self._coupling)
+        self._carry(values, self._coupling)
 
     def part(self, values: np.ndarray) -> None:
         """Multiply by the inverse of S."""
-        self._add(self.lower, self.upper, values, -self._coupling)
+        self._carry(values, -self._coupling)
         self._turn(values, "nji,nj->ni")
 
     def fold(self, values: np.ndarray) -> None:
         """Multiply by the transpose of S: forces on upper nodes act on the lower ones, too."""
-        self._add(self.upper, self.lower, values, np.swapaxes(self._coupling, 1, 2))
+        self._press(values, np.swapaxes(self._coupling, 1, 2))
         self._turn(values, "nji,nj->ni")
 
     def unfold(self, values: np.ndarray) -> None:
         """Multiply by the inverse of the transpose of S."""
         self._turn(values, "nij,nj->ni")
-        self._add(self.upper, self.lower, values, -np.swapaxes(self._coupling, 1, 2))
+        self._press(values, -np.swapaxes(self._coupling, 1, 2))
 
     def upright(self, frames: FloatArray) -> FloatArray:
         """Return the ``frames`` (m, 3, 3) of all candidates, which S has not turned already."""
@@ -149,9 +177,13 @@ class Pairs:
         own, here = values[: 3 * self.upper.owned].reshape(-1, 3), self.upper.is_owned
         own[self.upper.local[here]] = np.einsum(how, self.frames[here], own[self.upper.local[here]])
 
-    def _add(self, here: Numbering, there: Numbering, values: np.ndarray, shares: FloatArray) -> None:
-        given = here.gather_vectors(values[: 3 * here.owned])
-        there.add_vectors(values, np.einsum("nij,nj->ni", shares, given))
+    def _carry(self, values: np.ndarray, shares: FloatArray) -> None:
+        given = self.below(values[: 3 * self.lower.owned])
+        self.upper.add_vectors(values, np.einsum("nij,nj->ni", shares, given))
+
+    def _press(self, values: np.ndarray, shares: FloatArray) -> None:
+        given = self.upper.gather_vectors(values[: 3 * self.upper.owned])
+        self._hand_on(values, np.einsum("nij,nj->ni", shares, given))
 
     def fold_blocks(self, blocks: np.ndarray) -> None:
         """Add the diagonal blocks (points, 9) of upper nodes to those of their lower ones, and turn them."""
@@ -167,27 +199,33 @@ class Pairs:
         """Return S with the sizes of a matrix ``like``; the caller destroys it."""
         (first, last), (_, size), here = like.getOwnershipRange(), like.getSize(), self.upper.is_owned
         of_upper = 3 * self.upper.local[here][:, None] + np.arange(3)
-        of_lower = 3 * self.lower.numbers[here][:, None] + np.arange(3)
+        shares = sp.identity(len(here), format="csr") if self.mortar is None else self.mortar.matrix()
+        weights, own = shares[here].tocoo(), np.flatnonzero(here)
+        of_lower = 3 * self.lower.numbers[weights.col][:, None] + np.arange(3)
         others = np.setdiff1d(np.arange(last - first), of_upper)
         turned = np.broadcast_to(of_upper[:, :, None], self.frames[here].shape)
-        below = np.broadcast_to(of_lower[:, None, :], turned.shape)
-        rows = [others, turned, turned]
-        columns = [first + others, first + np.swapaxes(turned, 1, 2), below]
-        values = [np.ones(len(others)), self.frames[here], self._coupling[here]]
+        coupled = weights.data[:, None, None] * self._coupling[own[weights.row]]
+        rows = [others, turned, turned[weights.row]]
+        columns = [
+            first + others,
+            first + np.swapaxes(turned, 1, 2),
+            np.broadcast_to(of_lower[:, None, :], coupled.shape),
+        ]
+        values = [np.ones(len(others)), self.frames[here], coupled]
         parts = (np.concatenate([part.ravel() for part in each]) for each in (values, rows, columns))
-        weights, *places = parts
-        found = sp.coo_matrix((weights, places), shape=(last - first, size)).tocsr()
+        entries, *places = parts
+        found = sp.coo_matrix((entries, places), shape=(last - first, size)).tocsr()
         csr = found.indptr.astype(PETSc.IntType), found.indices.astype(PETSc.IntType), found.data
         return PETSc.Mat().createAIJ(like.getSizes(), bsize=3, csr=csr, comm=like.comm)
 
     def react(self, into: FloatArray, forces: FloatArray) -> None:
         """Add to nodal forces what the upper nodes exert on the lower ones if the ``forces`` of all
         candidates (m, 3), N, act on them."""
-        self.lower.add_vectors(into, -forces[self.nodes])
+        self._hand_on(into, -forces[self.nodes])
 
     def relative(self, moved: FloatArray, values: FloatArray) -> None:
         """Make displacements of all candidates, ``moved``, relative to the lower nodes, with all ``values``."""
-        moved[self.nodes] -= self.free * self.lower.gather_vectors(values)
+        moved[self.nodes] -= self.free * self.below(values)
 
 
 def pairs_of(

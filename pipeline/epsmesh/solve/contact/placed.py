@@ -17,9 +17,6 @@ from epsmesh.solve.contact.touching import ContactSolution, PlacedTool
 _NEXT = 0.5
 # Heights that differ by this share of all of them are the same: rounding.
 _SAME = 1e-9
-# Between tissues that both strain much, a node that returns may penetrate freely, and pull where it stuck before: no
-# set has neither. It may then penetrate so many times as much.
-_YIELDING = 10.0
 
 
 def placed_tool(body: DeformedBody, tool: Tool, depth: float, away: float | None = None) -> PlacedTool:
@@ -57,6 +54,8 @@ def _of_law(body: DeformedBody, number: int, bed: Bed) -> Bed:
     """Return a ``bed`` with the gaps of the law of a ``body``, at the nodes of the contact with this ``number``."""
     part = body.part(number)
     if bed.is_tissue:
+        if not (body.law.is_linear or bed.sticks):
+            body.slide(number)
         return bed.beside_tissue(part.of(body.places), partial(body.normals_on, number))
     return bed.at_rest(part.candidates.points) if body.law.is_linear else bed
 
@@ -87,16 +86,16 @@ def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
     """Return the nodes on the beds of a ``tool`` at a ``depth`` (m); without an earlier contact, those touch that are
     next to a support."""
     count = len(body.candidates)
-    nodes, stick, begin = (np.zeros(count, dtype=bool) for _ in range(3))
+    nodes, stick, begin, yields = (np.zeros(count, dtype=bool) for _ in range(4))
     supports, jaws = list[BoolArray](), list[BoolArray]()
     for number, bed in enumerate(tool.beds, start=1):
         part = body.part(number)
         (supports if bed.is_support else jaws).append(part.mask(count))
         nodes[part.nodes], stick[part.nodes] = True, bed.sticks and (bed.fits or _lowest(part.candidates, bed))
+        yields[part.nodes] = bed.is_tissue and not body.law.is_linear
         if bed.is_support:
             heights = bed.height(part.candidates.points)
             begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth
     holds = () if body.is_held else (*supports, *((*jaws, ~nodes) if jaws else ()))
     begin = begin if tool.begins is None else tool.begins
-    is_soft = not body.law.is_linear and any(bed.is_tissue for bed in tool.beds)
-    return Resting(nodes, begin, stick, body.places, _YIELDING if is_soft else 1.0, tuple(jaws), holds)
+    return Resting(nodes, begin, stick, body.places, yields, tuple(jaws), holds)

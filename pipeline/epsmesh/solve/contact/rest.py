@@ -202,7 +202,7 @@ def force_left(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution
     for number, bed in enumerate(beds, start=1):
         if bed.is_tissue:
             forces[body.part(number).nodes] = 0.0
-    held = global_sum(space.comm, body.residual().reshape(-1, 3)[space.bearing_owned].sum(axis=0))
+    held = global_sum(space.comm, body.on_support(touched.forces).reshape(-1, 3)[space.bearing_owned].sum(axis=0))
     left = held - body.on_terms + forces.sum(axis=0)
     left[list(body.elements.body.mirrored)] = 0.0
     return np.asarray(left)
@@ -216,7 +216,7 @@ def overlap(body: DeformedBody, beds: Sequence[Bed], touched: ContactSolution) -
     """
     found = 0.0
     for number, bed in enumerate(beds, start=1):
-        if bed.is_tissue:
+        if bed.is_tissue and bed.sticks:
             part, below, normals = body.part(number), body.below(number), body.normals_on(number)
             is_open, gap = ~part.of(touched.active), part.of(touched.gap)
             upper = below + part.of(body.positions() - body.places)

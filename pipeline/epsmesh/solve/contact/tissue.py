@@ -13,14 +13,16 @@ from epsmesh.solve.compiled import global_sum
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.levels import Surface
 from epsmesh.solve.contact.normals import deformed_normals
-from epsmesh.solve.contact.numbering import Numbering
+from epsmesh.solve.contact.numbering import Numbering, Pairs
 from epsmesh.solve.contact.parts import TOOL, Part, part_of
+from epsmesh.solve.contact.sliding import SlidingTissue
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.turned_tangent import FactorisedTangent, IteratedTangent, TurnedTangent
 from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.hyperelastic import HyperelasticBody
 from epsmesh.solve.krylov import keep
 from epsmesh.solve.loads import Applied
+from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
 from epsmesh.stages import stage
 
@@ -60,7 +62,8 @@ class DeformedBody:
         if applied is not None:
             self._body.carry(applied)
         self._unit = elements.unit(law)
-        self._numbering, self._pairs = Numbering(space.space, self.candidates.numbers), surface.pairs(elements.degree)
+        self._numbering, self._at_rest = Numbering(space.space, self.candidates.numbers), surface.pairs(elements.degree)
+        self._sliding: SlidingTissue | None = None
         self._places = self.candidates.points
         if space.body.imaged is not None:
             self._places = self._numbering.gather_vectors(space.places)
@@ -82,6 +85,19 @@ class DeformedBody:
         self.slope: float | None = None
         self.iterations = 0
 
+    def slide(self, number: int) -> None:
+        """Let loose tissue slide from now on, on the tissue below of the contact with this ``number``."""
+        if self._sliding is None:
+            assert self._at_rest is not None
+            self._sliding = SlidingTissue(self._at_rest, self.part(number).candidates)
+
+    @property
+    def _pairs(self) -> Pairs | None:
+        """The pairs of loose tissue, where it has slid in this state."""
+        if self._sliding is None:
+            return self._at_rest
+        return self._sliding.pairs(self._now.array[: self._space.owned])
+
     # ---- the interface --------------------------------------------------------------------------------
 
     @property
@@ -96,7 +112,15 @@ class DeformedBody:
 
     def positions(self) -> FloatArray:
         """Return the nodes' deformed positions (n, 3), in m; of loose tissue, as the tissue below sees them."""
-        return self.places + self._moved(self._now.array[: self._space.owned])
+        found = self.places + self._moved(self._now.array[: self._space.owned])
+        if self._sliding is not None:
+            assert self._pairs is not None
+            found[self._pairs.nodes] += self._sliding.offset
+        return found
+
+    def displacements(self) -> FloatArray:
+        """Return the nodes' displacements (n, 3), in m, of loose tissue relative to what is now below it."""
+        return self._moved(self._now.array[: self._space.owned])
 
     def forces(self) -> FloatArray:
         """Return the nodal forces (n, 3), N; zero at prescribed components."""
@@ -127,6 +151,11 @@ class DeformedBody:
             SolveError: if the linear solver fails.
         """
         self._from = self.state
+        self._tangent.pairs = pairs = self._pairs
+        if self._sliding is not None and pairs is not None:
+            pressing = np.einsum("ni,ni->n", self.forces()[pairs.nodes], pairs.normal)
+            pressing = np.where(constraint.held[pairs.nodes, -1], np.maximum(pressing, 0.0), 0.0)
+            self._tangent.slipping = self._sliding.slipping(pressing)
         self._tangent.update(self._now, constraint)
         self._prescribe(constraint)
         with self._body.state() as right:
@@ -137,7 +166,7 @@ class DeformedBody:
                 self._pairs.react(right.array, constraint.forces / self._unit)
             target = constraint.left * float(np.linalg.norm(self.forces())) / self._unit
             self._tangent.solve(constraint, right, self._change, target)
-            self.slope = None if self._body.is_mixed else -self._residual.dot(self._change)
+            self.slope = None if self._body.is_mixed or self._sliding is not None else -self._residual.dot(self._change)
             self._tangent.multiply(self._change, right)
             moved = self._moved(self._change.array[: self._space.owned])
             change = self._numbering.gather_vectors(self._unit * right.array[: self._space.owned])
@@ -190,6 +219,8 @@ class DeformedBody:
         at_rest[self._pairs.nodes], free[self._pairs.nodes] = self._pairs.normal, self._pairs.free
         if self.law.is_linear:
             return np.asarray(part.of(at_rest))
+        if self._sliding is not None:
+            return self._pairs.normal
         return deformed_normals(part.candidates, self.below(number), part.of(at_rest), part.of(free))
 
     def below(self, number: int) -> FloatArray:
@@ -199,11 +230,32 @@ class DeformedBody:
             found[self._pairs.nodes] += self._pairs.lower.gather_vectors(self._now.array[: self._space.owned])
         return np.asarray(self.part(number).of(found))
 
+    def overhang(self, forces: FloatArray) -> float:
+        """Return the part (N) of the ``forces`` (n, 3), N, with which loose tissue presses beyond the edge of that
+        below.
+
+        Raises:
+            LargeError: if places of it have no tissue below.
+        """
+        if self._sliding is None or self._pairs is None:
+            return 0.0
+        if self._sliding.is_lost:
+            raise LargeError("loose tissue has places without tissue below along its normals: use a smaller depth")
+        return self._sliding.overhang(np.einsum("ni,ni->n", forces[self._pairs.nodes], self._pairs.normal))
+
     # ---- results ----------------------------------------------------------------------------------------
 
     def residual(self) -> FloatArray:
         """Return the nodal forces (N) of the displacement, owned dofs, reactions of the support included."""
         return self._forces()[: self._space.owned].copy()
+
+    def on_support(self, forces: FloatArray) -> FloatArray:
+        """Return the nodal forces (N), owned dofs, besides the ``forces`` (n, 3), N, on the candidates: those of the
+        support, also where loose tissue presses next to it."""
+        found = self.residual()
+        if self._pairs is not None:
+            self._pairs.react(found, -forces)
+        return found
 
     def shortening(self, foot: tuple[float, float]) -> float:
         """Return how far (m) a tool that deforms gives way along its axis, at its ``foot`` (m); NaN of a rigid one."""

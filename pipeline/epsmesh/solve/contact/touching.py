@@ -18,6 +18,9 @@ SLACK = 1e-6
 # The same for penetration of nodes that stick where they touch: one that leaves carries forces along the bed, too, and
 # sets of nodes that hardly press would follow each other forever.
 _STICKING = 1e-3
+# The same between tissues that both strain much, where sets repeat: a node that returns may penetrate freely, and pull
+# where it pressed before, and no set has neither.
+YIELDING = 1e-2
 # Sets repeat if one is solved so often.
 _REPEATED = 2
 
@@ -90,7 +93,7 @@ class PlacedTool:
         """Return the same where the active set repeats for the so-manieth time."""
         if self.resting is None or repeats < _REPEATED:
             return self.slack
-        return np.where(self.resting.stick, self.resting.yielding, 1.0) * self.slack
+        return np.where(self.resting.yields, YIELDING * self.depth, self.slack)
 
     def start(self) -> BoolArray:
         """Return the nodes (n) that touch at the start of a path."""

@@ -16,6 +16,7 @@ from epsmesh.arrays import BoolArray, FloatArray, Int32Array
 from epsmesh.solve.contact.constraint import Constraint
 from epsmesh.solve.contact.levels import Hierarchy, Surface
 from epsmesh.solve.contact.numbering import Numbering, Pairs
+from epsmesh.solve.contact.sliding import Slipping
 from epsmesh.solve.elements.assembled import AssembledTangent
 from epsmesh.solve.elements.base import Elements, Solver
 from epsmesh.solve.elements.displacement import DisplacementSolver
@@ -65,7 +66,8 @@ class TurnedTangent(ABC):
         stack: ExitStack,
     ):
         """Prepare; what is made is freed with the stack."""
-        self._pairs = surface.pairs(elements.degree)
+        self.pairs = surface.pairs(elements.degree)
+        self.slipping: Slipping | None = None
         self._elements, self._space = elements, elements.displacements
         self._law, self._unit, self._stack = law, elements.unit(law), stack
         self._body, self._numbering = body, numbering
@@ -92,20 +94,20 @@ class TurnedTangent(ABC):
 
     def _frames_of(self, constraint: Constraint) -> FloatArray:
         """Return the frames (n, 3, 3) of the candidates that the matrix S of loose tissue has not turned already."""
-        return constraint.frames if self._pairs is None else self._pairs.upright(constraint.frames)
+        return constraint.frames if self.pairs is None else self.pairs.upright(constraint.frames)
 
     def _joined(self, constraint: Constraint) -> Pairs | None:
         """Return the pairs of loose tissue where a constraint holds."""
-        return None if self._pairs is None else self._pairs.holding(constraint.held[:, -1], self._firm(constraint))
+        return None if self.pairs is None else self.pairs.holding(constraint.held[:, -1], self._firm(constraint))
 
     def _firm(self, constraint: Constraint) -> BoolArray | None:
         """Return the nodes (n) whose tangents are held where the preconditioner has to know it: above a bed, and on a
         tool that deforms, to which they are then tied."""
         firm = constraint.firm
-        if self._pairs is None:
+        if self.pairs is None:
             return firm
         tied = np.zeros(len(constraint.held), dtype=bool)
-        tied[self._pairs.nodes] = constraint.held[self._pairs.nodes].all(axis=1)
+        tied[self.pairs.nodes] = constraint.held[self.pairs.nodes].all(axis=1)
         return tied if firm is None else firm | tied
 
     def _slots(self, constraint: Constraint) -> Int32Array:
@@ -231,6 +233,8 @@ class IteratedTangent(TurnedTangent):
         """Write the product with a change of the state."""
         self._body.tangent.mult(x, result)
         result.array[self._dofs] -= np.einsum("nij,nj->ni", self._turning, x.array_r[self._dofs])
+        if self.slipping is not None:
+            self.slipping.add(x.array_r, result.array, 1 / self._unit)
 
     def mult(self, _: PETSc.Mat, x: PETSc.Vec, result: PETSc.Vec) -> None:
         """Write the product in the turned frames, identity at held slots; PETSc calls this."""

@@ -48,6 +48,10 @@ class MeridianTissue:
         """Return the nodes' deformed positions (n, 2)."""
         return self.places + self._now[self._dofs]
 
+    def displacements(self) -> FloatArray:
+        """Return the nodes' displacements (n, 2), in m."""
+        return np.asarray(self._now[self._dofs])
+
     def forces(self) -> FloatArray:
         """Return the nodal forces (n, 2); zero at prescribed components."""
         return np.where(self.fixed, 0.0, self.residual()[self._dofs])

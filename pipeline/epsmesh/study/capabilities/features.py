@@ -379,9 +379,6 @@ FEATURES: dict[str, Feature] = {
         ("probe",),
         where=_contact_of_layer,
     ),
-    "loose layer that slides": Feature(
-        "body.layer", lambda s: s.body.loose is not None and s.body.loose.friction < inf, where=_friction_of_layer
-    ),
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
     ),

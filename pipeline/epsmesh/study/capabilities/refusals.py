@@ -308,9 +308,9 @@ REFUSALS: tuple[Refusal, ...] = (
         'must be "unilateral" on a loose layer: its contact and that of the tool are found together',
     ),
     Refusal(
-        "loose layer that slides",
+        "loose layer that rubs",
         "large displacements",
-        f'must be "stick" {_OF_LAW}: nodes that slide would leave those of the tissue below, on which they are',
+        f'must be 0 or "stick" {_OF_LAW}',
     ),
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
     Refusal("level loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
