@@ -128,6 +128,7 @@ benchmark: setup ## make the tables of docs/why/performance.md in results/ (on a
 peers: setup ## compare with NGSolve, scikit-fem and CalculiX the time for a true error, with NGSolve error bars (on an idle machine)
 	@scripts/peers.sh
 	$(PYTHON) -m benchmarks.peers $(PEERS_ARGS)
+	$(PYTHON) -m benchmarks.peers.contacts
 	$(PYTHON) -m benchmarks.strangers
 
 engines: setup ## compare the force on a ball in a pad with those of MuJoCo, Newton and PyBullet (an hour): results/engines.md

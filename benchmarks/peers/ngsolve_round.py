@@ -7,6 +7,7 @@ F (N), and how far F of one order less, and of fewer or larger elements, is from
 import json
 import os
 import sys
+from collections.abc import Callable
 from math import sqrt
 from typing import Any
 
@@ -79,7 +80,8 @@ def _strain(u: Any, gradient: Any) -> tuple[Any, ...]:
     return gradient[0, 0], gradient[1, 1], u[0] / ng.x, gradient[0, 1] + gradient[1, 0]
 
 
-def _linear(space: Any, mu: Any, lam: Any) -> Any:
+def linear_form(space: Any, mu: Any, lam: Any) -> Any:
+    """Return the form of linear elasticity on rings."""
     u, v = space.TnT()
     first, second = _strain(u, ng.Grad(u)), _strain(v, ng.Grad(v))
     product = sum(a * b for a, b in zip(first[:3], second[:3], strict=True))
@@ -95,7 +97,7 @@ def _disc(scene: Scene, order: int, levels: int) -> float:
     space = ng.VectorH1(mesh, order=order, dirichletx="axis|fixed" + "|probe" * is_bonded, dirichlety="fixed|probe")
     state, down = ng.GridFunction(space), ng.GridFunction(space)
     down.Set(ng.CF((0, -1)), definedon=mesh.Boundaries("probe"))
-    matrix = ng.BilinearForm(_linear(space, mu, lam)).Assemble().mat
+    matrix = ng.BilinearForm(linear_form(space, mu, lam)).Assemble().mat
     residual = (matrix * down.vec).Evaluate()
     state.vec.data = down.vec - matrix.Inverse(space.FreeDofs(), "sparsecholesky") * residual
     return float(scene["depth"] * ng.InnerProduct(state.vec, (matrix * state.vec).Evaluate()))
@@ -121,7 +123,7 @@ def _ball(scene: Scene, order: int, elements: int) -> float:
         return stiff * w[1] - traction(w)
 
     linear = ng.BilinearForm(space)
-    linear += _linear(space, mu, lam)
+    linear += linear_form(space, mu, lam)
     linear += -around / stiff * traction(u) * traction(v) * on_face
     linear.Assemble()
     state = ng.GridFunction(space)
@@ -149,8 +151,8 @@ def _ball(scene: Scene, order: int, elements: int) -> float:
     raise RuntimeError(f"contact was not found in {_MOST_STEPS} steps")
 
 
-def main() -> None:
-    """Answer the scenes; output of the libraries goes to standard error."""
+def serve(force: Callable[[Scene], tuple[float, float]]) -> None:
+    """Answer the scenes on standard input with their ``force``; output of the libraries goes to standard error."""
     scenes = json.load(sys.stdin)
     out = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
@@ -165,4 +167,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    serve(force)

@@ -5,13 +5,14 @@ from shutil import which
 
 import pytest
 
-from benchmarks.peers import figure, program, results
+from benchmarks.peers import contacts, figure, program, results
 from benchmarks.peers.processes import PEERS_PYTHON, ask
 from benchmarks.peers.results import Run, medians, standings
 from benchmarks.peers.settings import CONTACT_GRID, GRIDS, LADDERS, LARGE_GRID
 from benchmarks.peers.tasks import TASKS
 from benchmarks.peers.truth import Truth
 from benchmarks.peers.worker import Answer, answers
+from epsmesh.study.read import parse
 
 NEEDS_PEERS = pytest.mark.skipif(not PEERS_PYTHON.exists(), reason="scripts/peers.sh has not been run")
 
@@ -148,3 +149,22 @@ def test_every_ladder_is_of_settings_that_exist():
         known = {key for setting in (*GRIDS[peer], *CONTACT_GRID, *LARGE_GRID) for key in setting}
         assert set(ladders) <= set(TASKS)
         assert all(set(setting) <= known for ladder in ladders.values() for setting in ladder)
+
+
+@pytest.mark.parametrize("name", contacts.SCENES)
+def test_a_scene_of_several_contacts_is_a_study_of_one_case(name):
+    """Of each kind are two scenes; the heights of layers add up to that of the body."""
+    scene = contacts.SCENES[name]
+    assert [other["kind"] for other in contacts.SCENES.values()].count(scene["kind"]) == 2
+    case = parse(contacts.study_of(scene)).case(())
+    assert case.body.height == pytest.approx(1e-3 * sum(layer["thickness"] for layer in scene["layers"]))
+    assert (case.probe.young is not None) == (scene["kind"] == "elastic tip")
+
+
+@NEEDS_PEERS
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", contacts.SCENES)
+def test_several_contacts_have_the_force_of_another_program(name):
+    ((force, bar),) = contacts.known([contacts.SCENES[name]])
+    assert bar < 1e-3
+    assert contacts.compared(name, force, bar)["verdict"] == "within"
