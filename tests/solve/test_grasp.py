@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from mpi4py import MPI
 
+from epsmesh.fitted import FRICTION
 from epsmesh.plan.plan import make_plan
 from epsmesh.report.dataset import build
 from epsmesh.run.execute import compute
@@ -115,6 +116,19 @@ def test_friction_is_between_none_and_sticking(material):
     assert rubs.slip_area > 0
     assert rubs.largest["jaw_force"] == pytest.approx(rubs.force, rel=1e-7)
     assert rubs.torque == rubs.largest["jaw_torque"] == 0.0
+
+
+def test_the_bar_of_a_jaw_contains_what_friction_adds_to_its_own_force():
+    """Friction adds more to the force of a disc than to that of a ball: the disc's bar is wider, whichever is first."""
+    second = {"shape": "disc", "radius": "3 mm"}
+    rubs, smooth = (
+        closed(BALL | {"friction": friction}, second, body={"fixed": "sides"}, mesh={"rim": "1 mm"})
+        for friction in (0.3, 0)
+    )
+    added = rubs.largest["jaw_force"] / smooth.largest["jaw_force"] - 1
+    assert added > 1.5 * (rubs.force / smooth.force - 1)
+    bar, of_smooth = (found.largest["jaw_force_error"] / found.largest["jaw_force"] for found in (rubs, smooth))
+    assert bar - of_smooth > FRICTION * added
 
 
 def test_with_friction_lateral_forces_of_jaws_and_sides_balance():

@@ -147,6 +147,14 @@ def found_again_bar(
     return 2 * share / fitted.FOUND, bar / (1 - min(bar, fitted.MOST))
 
 
+def of_steps(force: float, coarse: float, without: float) -> float:
+    """Return the relative bar of friction on a ``force`` (N), which is ``coarse`` with half as many load steps.
+
+    It contains a share of what friction adds to the force ``without`` it.
+    """
+    return abs(coarse / force - 1) + fitted.FRICTION * abs(force / without - 1)
+
+
 def unresolved(rim: float) -> float:
     """Return the least relative bar on F where elements at the edge of contact, ``rim`` half widths, are too large."""
     return rim / (rim + fitted.FOUND_UNRESOLVED) if rim > 1 else 0.0

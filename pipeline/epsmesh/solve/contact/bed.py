@@ -6,6 +6,7 @@ loop: the tool's nodes have the tool's distance, those above a bed have the bed'
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import lru_cache
 from math import inf
 
@@ -29,6 +30,14 @@ def above_places(
         return heights_along(normal, lambda points: distance(points, depth), places)
 
     return lambda points, depth: Distance.along(normal, heights(depth), points - places)
+
+
+class Kind(Enum):
+    """What a bed is."""
+
+    SUPPORT = "support"
+    JAW = "jaw"
+    TISSUE = "tissue"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,19 +80,21 @@ class Bed:
     tissue: LooseTissue | None = None
 
     @property
-    def is_tissue(self) -> bool:
-        """Whether it is tissue."""
-        return self.tissue is not None
+    def kind(self) -> Kind:
+        """A support on which the body rests, a jaw, or tissue."""
+        if self.tissue is not None:
+            return Kind.TISSUE
+        return Kind.SUPPORT if self.ends_at is None else Kind.JAW
 
     @property
-    def is_support(self) -> bool:
-        """Whether the body rests on it before the tool comes."""
-        return self.ends_at is None
+    def is_tissue(self) -> bool:
+        """Whether it is tissue."""
+        return self.kind is Kind.TISSUE
 
     @property
     def drags(self) -> bool:
         """Whether it is a support along which friction holds the body."""
-        return self.is_support and self.friction > 0 and not self.is_tissue
+        return self.kind is Kind.SUPPORT and self.friction > 0
 
     @property
     def advance(self) -> FloatArray:

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from epsmesh import fitted
 from epsmesh.arrays import Int32Array
 from epsmesh.solve.compiled import vector
 from epsmesh.solve.contact.active_set import Obstacle, SettledContact, find_set
@@ -21,6 +20,7 @@ from epsmesh.solve.contact.levels import HeldOperator, normal_dofs
 from epsmesh.solve.contact.surface_contact import SurfaceContact
 from epsmesh.solve.elements.base import Elements, HierarchicalEstimate
 from epsmesh.solve.elements.mixed import MixedSolver
+from epsmesh.solve.estimate import of_steps
 from epsmesh.solve.hierarchical_estimate import energy_decrements
 from epsmesh.solve.linear_solver import LinearSolver
 
@@ -53,14 +53,14 @@ def estimate_of(
 def half_the_steps(found: HierarchicalEstimate, contact: SurfaceContact, without: float) -> HierarchicalEstimate:
     """Return the estimate ``found`` of frictionless contact, whose force is ``without`` (N), with the bars of friction.
 
-    They are the change from half as many load steps, and a share of what friction adds. The shares of force and area
-    are those without friction.
+    They are those :func:`of_steps`. The shares of force and area are those without friction. What else touches the body
+    has bars of its own: :meth:`.Rest.half_the_steps`.
     """
     assert found.relative is not None
     assert found.decrements is not None
     assert contact.coarse is not None
     force, at_edge = contact.force, contact.area.bar
-    of_friction = abs(force_of(contact.coarse) / force - 1) + fitted.FRICTION * abs(force / without - 1)
+    of_friction = of_steps(force, force_of(contact.coarse), without)
     return replace(
         found,
         decrements=found.decrements * (force / without),
@@ -68,7 +68,6 @@ def half_the_steps(found: HierarchicalEstimate, contact: SurfaceContact, without
         area_bar=at_edge + (found.area_bar - found.at_edge),
         at_edge=at_edge,
         friction_bar=of_friction,
-        rests=tuple(replace(rest, force=rest.force + of_friction) for rest in found.rests),
     )
 
 

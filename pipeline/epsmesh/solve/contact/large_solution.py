@@ -193,7 +193,8 @@ class LargeContactSolution:
             found = half_the_steps(found, self.surface_contact, smooth.force)
             more = found.friction_bar * self.shortening
             both = zip(self.rests, found.rests, self.beside.rests, smooth.rests, strict=True)
-            rests = tuple(rest.half_the_steps(bars, coarse, of_smooth) for rest, bars, coarse, of_smooth in both)
+            of_tool = found.friction_bar
+            rests = tuple(rest.half_the_steps(bars, coarse, without, of_tool) for rest, bars, coarse, without in both)
             found = replace(found, rests=rests, shortening_bar=found.shortening_bar + more)
             if (pulled := self.beside.pulled) is None:
                 return found

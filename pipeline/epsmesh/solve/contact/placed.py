@@ -6,7 +6,7 @@ import numpy as np
 
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance
-from epsmesh.solve.contact.bed import Bed, Resting
+from epsmesh.solve.contact.bed import Bed, Kind, Resting
 from epsmesh.solve.contact.checks import check_edge
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
@@ -90,10 +90,10 @@ def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
     supports, jaws = list[BoolArray](), list[BoolArray]()
     for number, bed in enumerate(tool.beds, start=1):
         part = body.part(number)
-        (supports if bed.is_support else jaws).append(part.mask(count))
+        (jaws if bed.kind is Kind.JAW else supports).append(part.mask(count))
         nodes[part.nodes], stick[part.nodes] = True, bed.sticks and (bed.fits or _lowest(part.candidates, bed))
         yields[part.nodes] = bed.is_tissue and not body.law.is_linear
-        if bed.is_support:
+        if bed.kind is not Kind.JAW:
             heights = bed.height(part.candidates.points)
             begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth
     holds = () if body.is_held else (*supports, *((*jaws, ~nodes) if jaws else ()))

@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from epsmesh import fitted
 from epsmesh.arrays import FloatArray
 from epsmesh.solve.compiled import global_sum
-from epsmesh.solve.contact.bed import Bed
+from epsmesh.solve.contact.bed import Bed, Kind
 from epsmesh.solve.contact.geometry import Area, contact_area, semi_axis, share_at_end
 from epsmesh.solve.contact.surface import Candidates
 from epsmesh.solve.contact.tissue import DeformedBody
 from epsmesh.solve.contact.touching import ContactSolution
 from epsmesh.solve.contact.turned import turned_frames
 from epsmesh.solve.contact_result import RestBars, RestResult
-from epsmesh.solve.estimate import found_again_bar, unresolved
+from epsmesh.solve.estimate import found_again_bar, of_steps, unresolved
 from epsmesh.solve.response import whole_force
 
 # The square of the edge of an equilateral facet, in units of its area.
@@ -96,7 +96,7 @@ class Rest:
     @property
     def unresolved(self) -> float:
         """The least relative bar on F: zero, but for contact with a support with elements larger than itself."""
-        if not self.bed.is_support or self.bed.is_tissue:
+        if self.bed.kind is not Kind.SUPPORT:
             return 0.0
         seen, active = self._in_its_plane, self.touched.active
         pressed = np.where(active, -seen.touched.forces[:, -1], 0.0)
@@ -132,9 +132,9 @@ class Rest:
             pressed=whole * self.pressed,
             area=whole * self.area.value,
             lifted=whole * max(self.whole_area - self.area.value, 0.0),
-            slip=self.slip if self.bed.is_support else nan,
+            slip=self.slip if self.bed.kind is Kind.SUPPORT else nan,
         )
-        if self.bed.is_support or not self.bed.friction:
+        if self.bed.kind is not Kind.JAW or not self.bed.friction:
             return found
         if self.mirrored:  # a mirror image has the opposite torque
             return replace(found, torque=0.0, torque_bar=0.0)
@@ -154,7 +154,7 @@ class Rest:
         What is unknown at the edges and sharp ends of all contacts, as in `found_again_bar`, bounds each force: the
         body hands it on.
         """
-        if self.bed.is_support and not self.bed.is_tissue:
+        if self.bed.kind is Kind.SUPPORT:
             return nan
         share, least = 1 - finer.pressed / self.pressed, fitted.AT_EDGE_LARGE[degree]
         return found_again_bar(share, at_edge, least, at_end=at_end)[1]
@@ -166,13 +166,17 @@ class Rest:
             return 0.0
         return share_at_end(self.candidates, self.touched.active, self.bed.ends_at, self._axes)
 
-    def half_the_steps(self, found: RestBars, coarse: "Rest", smooth: "Rest") -> RestBars:
-        """Return the bars ``found`` beside this friction, with those of that, of a support.
+    def half_the_steps(self, found: RestBars, coarse: "Rest", smooth: "Rest", of_friction: float) -> RestBars:
+        """Return the bars ``found`` beside this friction, with those of that.
 
-        They are the changes from half as many load steps, ``coarse``. The relative bar on slip is that of the contact
+        They are the changes from half as many load steps, ``coarse``, and of a force a share of what friction adds: at
+        least ``of_friction``, that of the tool. The relative bar on the slip along a support is that of the contact
         beside, ``smooth``, unknown if the support sticks there.
         """
-        if not self.bed.is_support:
+        if self.bed.kind is not Kind.SUPPORT:
+            of_force = of_steps(self.pressed, coarse.pressed, smooth.pressed)
+            found = replace(found, force=found.force + max(of_friction, of_force))
+        if self.bed.kind is Kind.JAW:
             return found
         of_area, of_slip = abs(coarse.area.value / self.area.value - 1), abs(coarse.slip - self.slip)
         of_mesh = found.slip / smooth.slip if smooth.slip else 0.0 if self.bed.sticks else nan
@@ -233,7 +237,7 @@ def height_beside(body: DeformedBody, beds: Sequence[Bed]) -> float:
     """
     found = [0.0]
     for number, bed in enumerate(beds, start=1):
-        if bed.is_support:
+        if bed.kind is not Kind.JAW:
             candidates = body.part(number).candidates
             found.append(float(bed.height(candidates.points)[~candidates.neighbours.followers].min()))
     return max(found)

@@ -8,7 +8,7 @@ import numpy as np
 from epsmesh.arrays import BoolArray, FloatArray
 from epsmesh.shapes.distance import Distance, heights_along
 from epsmesh.shapes.frame import Vector
-from epsmesh.solve.contact.bed import Bed, above_places
+from epsmesh.solve.contact.bed import Bed, Kind, above_places
 
 
 def _no_distance(points: FloatArray, depth: float) -> Distance:
@@ -94,7 +94,7 @@ class Tool:
             ends_at=lambda points: self.ends_at(points - by),
             distance=lambda points, depth: self.distance(points - by, depth),
             foot=(x, y),
-            beds=tuple(bed if bed.is_support else bed.moved(by) for bed in self.beds),
+            beds=tuple(bed.moved(by) if bed.kind is Kind.JAW else bed for bed in self.beds),
         )
 
     def torque(self, points: FloatArray, forces: FloatArray) -> float:
