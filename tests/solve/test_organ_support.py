@@ -80,6 +80,19 @@ def test_an_organ_settles_under_its_weight_and_is_pressed(surface, friction, at,
     assert found.largest["support_force_error"] >= 0
 
 
+@pytest.mark.nightly
+def test_facets_that_weight_flattens_below_the_plane_are_not_tissue_inside_the_tool(surface):
+    """Corners of coarse elements of degree 2 come below the plane by more than a share of a small depth."""
+    ball = BALL | {"radius": "6 mm", "depth": "0.1 mm", "at": ["0 mm", "0 mm"]}
+    sizes = EGG_SIZES | {"rim": "0.4 mm", "fine": "7 mm", "coarse": "7 mm"}
+    rests = surface("-6 mm", 0.3, FLAT)
+    fixed = {key: value for key, value in rests.items() if key != "support"} | {"fixed": {"below": "-11 mm"}}
+    found, held = (one(probe=ball, body=body, mesh=sizes, **HEAVY) for body in (rests, fixed))
+    assert found.force < held.force * (1 + found.force_error + held.force_error)
+    assert found.force > 0.8 * held.force
+    assert found.balance < 1e-6
+
+
 def hertz(depth: float, *radii: float) -> float:
     """Return the force (N) at which contacts in series, of these reduced radii (m), close by a depth (m)."""
     modulus = 10e3 / (1 - 0.3**2)

@@ -119,7 +119,7 @@ def reach_contact(
         except SolveError as error:
             raise LargeError(str(error)) from error
         if friction is None or not friction.is_linear:  # small displacements go round no tool
-            check_outside(tissue, touched, deepest)
+            check_outside(tissue, tool_at(amount), touched, deepest)
         iterations += touched.iterations
         return ContactPathPoint(amount, tissue.state, touched), touched.iterations <= _EASY
 
@@ -131,13 +131,15 @@ def reach_contact(
     return iterations
 
 
-def check_outside(tissue: SteppedTissue, touched: ContactSolution, deepest: float) -> None:
+def check_outside(tissue: SteppedTissue, tool: PlacedTool, touched: ContactSolution, deepest: float) -> None:
     """Check that no tissue is left inside the tool: such an equilibrium goes round a tool that is ``deepest`` (m) deep.
+
+    Followers on a support, as far below it as weight flattens facets between their neighbours, go round nothing.
 
     Raises:
         LargeError: if nodes that are not of the support are inside.
     """
-    if touched.gap[~tissue.fixed.all(axis=1)].min() < -_INSIDE * deepest:
+    if touched.gap[~(tissue.fixed.all(axis=1) | tool.followers_at_rest)].min() < -_INSIDE * deepest:
         raise LargeError("tissue is left inside the tool")
 
 

@@ -174,7 +174,7 @@ class ToolIndentation(ContactIndentation):
         return replace(placed_tool(self._tissue, self._tool, fraction * self._depth), depth=self._depth)
 
     def _check(self, touched: ContactSolution) -> None:
-        check_outside(self._tissue, touched, self._depth)
+        check_outside(self._tissue, self._placed(1.0), touched, self._depth)
 
     def _measure(self, touched: ContactSolution, fraction: float) -> None:
         tissue = self._tissue

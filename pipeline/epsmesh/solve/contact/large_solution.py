@@ -288,7 +288,7 @@ class LargeContactSolution:
             with suppress(SolveError):
                 first = first_set(body, placed, active)
                 touched = solve_contact(body, placed, first, is_patient=False, limit=_FOUND_AGAIN)
-                check_outside(body, touched, self.depth)
+                check_outside(body, placed, touched, self.depth)
                 return touched
         path = ContactPath(ContactPathPoint(0.0, sagged.state))
         reach_contact(body, tool_at, path, self.depth)

@@ -78,6 +78,13 @@ class PlacedTool:
         """Return those of the ``chosen`` nodes (n) that the tool may touch."""
         return chosen if self.resting is None else chosen & ~self.resting.nodes
 
+    @property
+    def followers_at_rest(self) -> BoolArray:
+        """The followers (n) that a support may touch, or tissue below, and not a jaw."""
+        if self.resting is None:
+            return np.zeros(len(self.followers), dtype=bool)
+        return self.followers & self.resting.nodes & ~np.any([*self.resting.jaws, ~self.resting.nodes], axis=0)
+
     def touches(self, active: BoolArray) -> bool:
         """Return whether the tool, and each second jaw, touches one of the ``active`` nodes (n)."""
         jaws = () if self.resting is None else self.resting.jaws
