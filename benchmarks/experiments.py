@@ -139,13 +139,14 @@ def with_bar(value: float, bar: float) -> str:
 
 
 def _benchmark(row: Comparison, output: Path) -> Number:
-    """Return the depth (mm) of the rounded punch, or what friction takes away of it (%)."""
-    found = _run("rounded-punch", output)
-    depth, bar = (1e3 * found[name].sortby("friction").values for name in ("depth", "depth_error"))
+    """Return by how much tissue goes below the rounded punch (mm), or what friction takes away of it (%)."""
+    found = _run("rounded-punch", output).sortby("friction")
+    moved = 1e3 * (found["depth"] - found["tool_shortening"]).values
+    bar = 1e3 * (found["depth_error"] + found["tool_shortening_error"]).values
     if row.scene.contact == "frictionless":
-        return Number(depth[0], bar[0], bar[0])
-    lost = 100 * (1 - depth[1] / depth[0])
-    return Number(lost, 100 * bar[1] / depth[0], 100 * bar[1] / depth[0])
+        return Number(moved[0], bar[0], bar[0])
+    lost = 100 * (1 - moved[1] / moved[0])
+    return Number(lost, 100 * bar[1] / moved[0], 100 * bar[1] / moved[0])
 
 
 def _ball(row: Comparison, output: Path) -> Number:
