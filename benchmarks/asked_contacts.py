@@ -52,7 +52,7 @@ _COLUMNS = dict.fromkeys(
 )  # fmt: skip
 
 # Seconds after which a scene with its truth is given up, and what is told of it.
-_LONGEST, _LONGEST_FURTHER = 75.0, 150.0
+_LONGEST, _LONGEST_FURTHER = 75.0, 900.0
 _TOO_LONG = ("not judged", *(math.nan,) * 3, 0, 0, math.nan, math.nan, "took too long")
 
 Study = dict[str, Any]
