@@ -110,6 +110,26 @@ def test_a_ball_that_sticks_and_lifts_nowhere_is_bonded():
     assert stuck.sag == pytest.approx(bonded.sag, rel=1e-6)
 
 
+def test_where_nodes_that_stick_neither_press_nor_are_clear_the_bar_has_their_area():
+    """No set of nodes is in equilibrium: some would penetrate if they were free, and pull where they stick."""
+    lump = {"name": "lump", "at": ["-7 mm", "7 mm", "-9 mm"], "radius": "3 mm", "young": "20 kPa", "poisson": 0.3}
+    sizes = {"epsilon": "8 mm", "fine": "3 mm", "coarse": "8 mm", "rim": "1 mm", "growth": 0.8}
+    disc = {"shape": "disc", "radius": "4 mm", "depth": "0.2 mm", "contact": "unilateral"}
+    contact, soft = {"contact": "unilateral", "friction": "stick"}, {"young": "10 kPa", "poisson": 0.5}
+    bonded, stuck = (
+        one(body={"inclusion": [lump | more]}, probe=disc, mesh=sizes, material=soft) for more in ({}, contact)
+    )
+    assert stuck.force == pytest.approx(bonded.force, rel=bonded.force_error)
+    assert stuck.largest["lift_off_area_error"] > 0
+
+
+def test_organs_of_an_image_do_not_slide_at_large_displacements(organs):
+    large = {"young": "10 kPa", "poisson": 0.4, "law": "neo-hookean"}
+    said = refusal(raw(body=organs(0) | {"size": None}, probe=ON_TOP, material=large))
+    assert "body.region[1].friction = 0" in said
+    assert 'must be "stick" with a law of large displacements' in said
+
+
 def test_a_ball_that_slides_is_softer_and_its_pressure_has_no_resultant():
     stuck, smooth = (one(body=ball(friction), load=PRESSED) for friction in ("stick", 0))
     assert smooth.force < stuck.force

@@ -92,7 +92,7 @@ def _resting(body: DeformedBody, tool: Tool, depth: float) -> Resting:
         part = body.part(number)
         (jaws if bed.kind is Kind.JAW else supports).append(part.mask(count))
         nodes[part.nodes], stick[part.nodes] = True, bed.sticks and (bed.fits or _lowest(part.candidates, bed))
-        yields[part.nodes] = bed.is_tissue and not body.law.is_linear
+        yields[part.nodes] = bed.is_tissue and (bed.sticks or not body.law.is_linear)
         if bed.kind is not Kind.JAW:
             heights = bed.height(part.candidates.points)
             begin[part.nodes] = heights <= heights[~part.candidates.neighbours.followers].min() + _NEXT * depth

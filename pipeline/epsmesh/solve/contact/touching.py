@@ -18,8 +18,8 @@ SLACK = 1e-6
 # The same for penetration of nodes that stick where they touch: one that leaves carries forces along the bed, too, and
 # sets of nodes that hardly press would follow each other forever.
 _STICKING = 1e-3
-# The same between tissues that both strain much, where sets repeat: a node that returns may penetrate freely, and pull
-# where it pressed before, and no set has neither.
+# The same between tissues that stick, or both strain much, where sets repeat: a node that returns may penetrate freely,
+# and pull where it pressed before, and no set has neither.
 YIELDING = 1e-2
 # Sets repeat if one is solved so often.
 _REPEATED = 2

@@ -382,6 +382,11 @@ FEATURES: dict[str, Feature] = {
     "loose layer that rubs": Feature(
         "body.layer", lambda s: s.body.loose is not None and 0 < s.body.loose.friction < inf, where=_friction_of_layer
     ),
+    "scanned region that slides": Feature(
+        "body.region",
+        lambda s: s.body.loose is not None and s.body.loose.place.startswith("region") and s.body.loose.friction == 0,
+        where=_friction_of_layer,
+    ),
     "tool that deforms": Feature(
         "probe.young", lambda s: s.probe.elastic is not None, write=lambda young: f"{young:.6g} Pa"
     ),

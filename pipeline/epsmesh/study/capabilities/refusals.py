@@ -312,6 +312,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "large displacements",
         f'must be 0 or "stick" {_OF_LAW}',
     ),
+    Refusal(
+        "scanned region that slides",
+        "large displacements",
+        f'must be "stick" {_OF_LAW}: nodes in contact do not settle on the rough surface of a scan',
+    ),
     Refusal("loose layer", "support that lets go", "is not computed on a support that lets go: give body.fixed"),
     Refusal("level loose layer", "no flat top", "is not computed below a tool that presses from the side: omit it"),
     Refusal("loose layer", "pull", "is not computed with jaws that are pulled: omit `pull`"),
