@@ -77,6 +77,28 @@ def test_a_solver_of_tangents_that_ends_at_its_last_iteration_has_not_converged(
         assert 10 < krylov.check_converged(enough) < 200
 
 
+def test_a_step_of_newton_may_keep_a_tenth_of_the_residual():
+    matrix = PETSc.Mat().createAIJ(50, nnz=1, comm=PETSc.COMM_SELF)
+    for row in range(50):
+        matrix.setValue(row, row, 1.0 + 10.0 * row)
+    matrix.assemble()
+    rhs, unknown = matrix.createVecs()
+    rhs.set(1.0)
+    plain = PETSc.PC().create(PETSc.COMM_SELF)
+    plain.setOperators(matrix)
+    plain.setType("none")
+    found = list[bool]()
+    for iterations in (2, 5, 10, 20):
+        with ExitStack() as stack:
+            ksp = krylov.solver_of("tangent, mixed", matrix, stack, plain, ksp_max_it=iterations, ksp_rtol=1e-12)
+            unknown.set(0.0)
+            ksp.solve(rhs, unknown)
+            found.append(krylov.is_nearly_converged(ksp))
+            assert found[-1] == ((rhs - matrix * unknown).norm() <= 0.1 * rhs.norm())
+            assert not krylov.has_converged(ksp)
+    assert {*found} == {False, True}
+
+
 def test_what_does_not_converge_is_a_failure():
     """For an indefinite operator no energy is smallest, and conjugate gradients fail."""
     matrix = PETSc.Mat().createAIJ(200, nnz=3, comm=PETSc.COMM_SELF)  # more than a coarsest level solves at once

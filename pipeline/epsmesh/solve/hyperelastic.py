@@ -15,7 +15,7 @@ from epsmesh.solve.elements.base import Elements
 from epsmesh.solve.elements.fields import Fields
 from epsmesh.solve.elements.tangent import Prestress, Tangent
 from epsmesh.solve.kernels.tangent import TangentCells
-from epsmesh.solve.krylov import INDEFINITE, explain, has_converged, solver_of
+from epsmesh.solve.krylov import INDEFINITE, explain, has_converged, is_nearly_converged, solver_of
 from epsmesh.solve.loads import Applied
 from epsmesh.solve.newton import LargeError
 from epsmesh.solve.physics import MaterialLaw
@@ -268,7 +268,7 @@ class HyperelasticBody:
                 self._counted(ksp, load, found)
         except PETSc.Error as error:
             raise LargeError(explain(error)) from error
-        if not has_converged(ksp):
+        if not (has_converged(ksp) or is_nearly_converged(ksp)):
             raise LargeError(f"reason {ksp.getConvergedReason()}")
 
     def _counted(self, ksp: PETSc.KSP, load: PETSc.Vec, found: PETSc.Vec) -> None:

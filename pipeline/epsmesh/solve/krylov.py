@@ -74,6 +74,8 @@ _ENLARGE, _RESULT, _TOO_SMALL = 14, 1, (-8, -9)
 
 _prefixes = itertools.count()
 INDEFINITE = PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC
+# Residual, in units of the right side, of a linear solve that is good enough for a step of Newton's method.
+_NEARLY = 0.1
 
 
 @contextmanager
@@ -108,6 +110,12 @@ def has_converged(ksp: PETSc.KSP) -> bool:
     reason = ksp.getConvergedReason()
     is_ended = ksp.getType() == PETSc.KSP.Type.GCR and reason == PETSc.KSP.ConvergedReason.CONVERGED_ITS
     return bool(reason > 0 and not is_ended)
+
+
+def is_nearly_converged(ksp: PETSc.KSP) -> bool:
+    """Return whether GCR ended at its largest number of iterations with a residual that is good for a Newton step."""
+    is_ended = ksp.getType() == PETSc.KSP.Type.GCR and not has_converged(ksp)
+    return bool(is_ended and ksp.getResidualNorm() <= _NEARLY * ksp.getRhs().norm())
 
 
 def check_converged(ksp: PETSc.KSP) -> int:
