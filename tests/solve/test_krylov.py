@@ -49,6 +49,17 @@ def test_forces_that_do_not_balance_are_a_failure():
         problem.solve(law(0.3), PRESS, method="iterative", tolerance=1e-3)
 
 
+def without_preconditioner(matrix):
+    """Assemble a matrix; return a right side of ones, unknowns, and a preconditioner that changes nothing."""
+    matrix.assemble()
+    rhs, unknown = matrix.createVecs()
+    rhs.set(1.0)
+    plain = PETSc.PC().create(PETSc.COMM_SELF)
+    plain.setOperators(matrix)
+    plain.setType("none")
+    return rhs, unknown, plain
+
+
 @pytest.mark.parametrize("kind", ["tangent", "tangent, mixed"])
 def test_a_solver_of_tangents_that_ends_at_its_last_iteration_has_not_converged(kind):
     """PETSc's GCR calls that a success: here with more than half of the residual left."""
@@ -56,12 +67,7 @@ def test_a_solver_of_tangents_that_ends_at_its_last_iteration_has_not_converged(
     for row in range(50):
         columns = [column for column in (row - 1, row, row + 1) if 0 <= column < 50]
         matrix.setValues([row], columns, [2.0 if column == row else -1.0 for column in columns])
-    matrix.assemble()
-    rhs, unknown = matrix.createVecs()
-    rhs.set(1.0)
-    plain = PETSc.PC().create(PETSc.COMM_SELF)
-    plain.setOperators(matrix)
-    plain.setType("none")
+    rhs, unknown, plain = without_preconditioner(matrix)
     with ExitStack() as stack:
         ksp = krylov.solver_of(kind, matrix, stack, plain, ksp_max_it=10)
         ksp.solve(rhs, unknown)
@@ -81,12 +87,7 @@ def test_a_step_of_newton_may_keep_a_tenth_of_the_residual():
     matrix = PETSc.Mat().createAIJ(50, nnz=1, comm=PETSc.COMM_SELF)
     for row in range(50):
         matrix.setValue(row, row, 1.0 + 10.0 * row)
-    matrix.assemble()
-    rhs, unknown = matrix.createVecs()
-    rhs.set(1.0)
-    plain = PETSc.PC().create(PETSc.COMM_SELF)
-    plain.setOperators(matrix)
-    plain.setType("none")
+    rhs, unknown, plain = without_preconditioner(matrix)
     found = list[bool]()
     for iterations in (2, 5, 10, 20):
         with ExitStack() as stack:

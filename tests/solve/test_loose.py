@@ -21,6 +21,14 @@ FLAP: dict[str, Any] = {
 WEIGHT = 1060 * 9.81 * 40e-3 * 40e-3 * 8e-3
 
 
+def check_within_bars(coarse: Any, fine: Any) -> None:
+    """Check that records of two meshes agree within the bars of both."""
+    assert abs(coarse.force - fine.force) < coarse.force * coarse.force_error + fine.force * fine.force_error
+    for name in ("interface_force", "lift_off_area"):
+        bars = sum(each.largest[f"{name}_error"] for each in (coarse, fine))
+        assert abs(coarse.largest[name] - fine.largest[name]) < bars
+
+
 def flap(friction: float | str | None = 0, **more: Any) -> dict[str, Any]:
     """Return a body whose first layer is loose; it is bonded if there is no ``friction`` to give."""
     contact = {} if friction is None else {"contact": "unilateral", "friction": friction}

@@ -279,13 +279,13 @@ class IteratedTangent(TurnedTangent):
             ksp = solver_of(kind, self._matrix, stack, preconditioner, **how)
             found.set(0.0)
             ksp.solve(load, found)
-            if has_converged(ksp) or is_nearly_converged(ksp) or (constraint.is_there and is_truncated(ksp, found)):
+            # The loop judges the state by its residual: a poor step costs iterations, and no accuracy.
+            is_enough = is_nearly_converged(ksp) or (constraint.is_there and is_truncated(ksp, found))
+            if is_enough or has_converged(ksp):
                 break
             # Conjugate gradients end where the tangent is indefinite, as far from equilibrium.
             if ksp.getConvergedReason() == INDEFINITE and isinstance(self._solver, DisplacementSolver):
                 self._solver.linear.refine_eigenvalues()
-        # The loop judges the state by its residual: a poor step costs iterations, and no accuracy.
-        is_enough = is_nearly_converged(ksp) or (constraint.is_there and is_truncated(ksp, found))
         self._body.iterations += int(ksp.its) if is_enough else check_converged(ksp)
 
     def _preconditioner(self, constraint: Constraint, stack: ExitStack) -> object:
